@@ -1,0 +1,4 @@
+//! The robot's side.
+
+pub mod joints;
+pub mod plant;

@@ -1,0 +1,5 @@
+//! From images to 6D poses of tag-covered shells.
+
+pub mod camera;
+pub mod rig;
+pub mod shells;
