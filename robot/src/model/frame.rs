@@ -1,0 +1,60 @@
+//! The frames whose motion the controller commands.
+
+use nalgebra::Isometry3;
+
+use super::Model;
+use crate::joints::{Leg, Side};
+
+/// A frame fixed to a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Frame {
+    /// The torso: x forward, y left, z up.
+    Torso,
+    /// A foot: centre of its sphere, axes of the calf.
+    Foot(Leg),
+    /// A gripper: grasp centre, -z out of the gripper.
+    Gripper(Side),
+}
+
+impl Frame {
+    /// How many there are.
+    pub const COUNT: usize = 7;
+
+    /// All frames, in the order of [`Self::index`].
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Torso,
+        Self::Foot(Leg::FrontRight),
+        Self::Foot(Leg::FrontLeft),
+        Self::Foot(Leg::RearRight),
+        Self::Foot(Leg::RearLeft),
+        Self::Gripper(Side::Right),
+        Self::Gripper(Side::Left),
+    ];
+
+    /// Place in arrays of [`Self::COUNT`].
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Torso => 0,
+            Self::Foot(leg) => 1 + leg.index(),
+            Self::Gripper(side) => 5 + side.index(),
+        }
+    }
+
+    /// The joint whose body carries it, or nothing for the torso.
+    pub const fn joint(self) -> Option<usize> {
+        match self {
+            Self::Torso => None,
+            Self::Foot(leg) => Some(leg.first_joint() + 2),
+            Self::Gripper(side) => Some(side.first_arm_joint() + 2),
+        }
+    }
+
+    /// Its pose in the frame of the body that carries it.
+    pub(crate) fn body_from_frame(self, model: &Model) -> Isometry3<f64> {
+        match self {
+            Self::Torso => Isometry3::identity(),
+            Self::Foot(leg) => *model.calf_from_foot(leg),
+            Self::Gripper(side) => *model.hand_from_gripper(side),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What can be controlled, and the references that say where it should be.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::joints::{Leg, Side};
+
+/// A desired point and its motion: in the world, or the three joints of an arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointReference {
+    /// m, or rad for joints.
+    pub position: Vector3<f64>,
+    /// m/s, or rad/s.
+    pub velocity: Vector3<f64>,
+    /// m/s², or rad/s².
+    pub acceleration: Vector3<f64>,
+}
+
+impl PointReference {
+    /// Stay there.
+    pub fn hold(position: Vector3<f64>) -> Self {
+        Self { position, velocity: Vector3::zeros(), acceleration: Vector3::zeros() }
+    }
+}
+
+/// A desired orientation in the world and its motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotationReference {
+    /// World from the controlled frame.
+    pub orientation: UnitQuaternion<f64>,
+    /// In the world, rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// In the world, rad/s².
+    pub angular_acceleration: Vector3<f64>,
+}
+
+impl RotationReference {
+    /// Stay so.
+    pub fn hold(orientation: UnitQuaternion<f64>) -> Self {
+        Self { orientation, angular_velocity: Vector3::zeros(), angular_acceleration: Vector3::zeros() }
+    }
+}
+
+/// Something to be tracked, with its reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Objective {
+    /// The torso's origin in the world.
+    TorsoPosition(PointReference),
+    /// The torso's orientation in the world.
+    TorsoOrientation(RotationReference),
+    /// A foot in the world.
+    FootPosition(Leg, PointReference),
+    /// A gripper's grasp centre in the world.
+    GripperPosition(Side, PointReference),
+    /// A gripper's orientation in the world.
+    GripperOrientation(Side, RotationReference),
+    /// The three joints of an arm. A stowed arm is held so, which no stance leg can feel.
+    ArmPosture(Side, PointReference),
+}
+
+/// What an [`Objective`] controls, without its reference: the rows of a mode's table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ObjectiveKind {
+    /// See [`Objective::TorsoPosition`].
+    TorsoPosition,
+    /// See [`Objective::TorsoOrientation`].
+    TorsoOrientation,
+    /// See [`Objective::FootPosition`].
+    FootPosition(Leg),
+    /// See [`Objective::GripperPosition`].
+    GripperPosition(Side),
+    /// See [`Objective::GripperOrientation`].
+    GripperOrientation(Side),
+    /// See [`Objective::ArmPosture`].
+    ArmPosture(Side),
+}
+
+impl Objective {
+    /// What it controls.
+    pub const fn kind(&self) -> ObjectiveKind {
+        match self {
+            Self::TorsoPosition(_) => ObjectiveKind::TorsoPosition,
+            Self::TorsoOrientation(_) => ObjectiveKind::TorsoOrientation,
+            Self::FootPosition(leg, _) => ObjectiveKind::FootPosition(*leg),
+            Self::GripperPosition(side, _) => ObjectiveKind::GripperPosition(*side),
+            Self::GripperOrientation(side, _) => ObjectiveKind::GripperOrientation(*side),
+            Self::ArmPosture(side, _) => ObjectiveKind::ArmPosture(*side),
+        }
+    }
+}

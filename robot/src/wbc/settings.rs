@@ -1,0 +1,148 @@
+//! The controller's numbers; `configs/robot/wbc.toml` says what each means and where it comes from.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::ObjectiveKind;
+
+/// Feedback of one kind of objective, and the limits of what it may ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gains {
+    /// K_p^acc for each axis, 1/s².
+    pub kp: Vector3<f64>,
+    /// K_d^acc for each axis, 1/s.
+    pub kd: Vector3<f64>,
+    /// Greatest error that is acted on, m or rad.
+    pub max_error: f64,
+    /// Greatest commanded acceleration, m/s² or rad/s².
+    pub max_acceleration: f64,
+    /// Singular values of the projected Jacobian below this are damped, m/rad or 1.
+    pub damping_start: f64,
+}
+
+/// Gains of every kind of objective.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectiveGains {
+    /// Torso position.
+    pub torso_position: Gains,
+    /// Torso orientation.
+    pub torso_orientation: Gains,
+    /// Foot position.
+    pub foot_position: Gains,
+    /// Gripper position.
+    pub gripper_position: Gains,
+    /// Gripper orientation.
+    pub gripper_orientation: Gains,
+    /// Posture of an arm.
+    pub arm_posture: Gains,
+}
+
+impl ObjectiveGains {
+    /// Those of one kind.
+    pub fn of(&self, kind: ObjectiveKind) -> &Gains {
+        match kind {
+            ObjectiveKind::TorsoPosition => &self.torso_position,
+            ObjectiveKind::TorsoOrientation => &self.torso_orientation,
+            ObjectiveKind::FootPosition(_) => &self.foot_position,
+            ObjectiveKind::GripperPosition(_) => &self.gripper_position,
+            ObjectiveKind::GripperOrientation(_) => &self.gripper_orientation,
+            ObjectiveKind::ArmPosture(_) => &self.arm_posture,
+        }
+    }
+}
+
+/// The contact-force problem.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactForceSettings {
+    /// µ of the friction pyramid.
+    pub friction: f64,
+    /// Least vertical force of a foot in contact, in body weights.
+    pub min_vertical: f64,
+    /// Greatest vertical force of a foot in full contact, in body weights.
+    pub max_vertical: f64,
+    /// Q_1: weight of the forces, 1/N².
+    pub force_weight: f64,
+    /// Q_2: weights of δ_t, the torso's linear (3) and angular (3) acceleration that is given up.
+    pub slack_weight: [f64; 6],
+    /// Steps in a row without forces that make a fault.
+    pub failures_to_fault: u32,
+}
+
+/// Everything in `wbc.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WbcSettings {
+    /// Feedback of the objectives.
+    pub objectives: ObjectiveGains,
+    /// Contact forces.
+    pub contact: ContactForceSettings,
+    /// Greatest joint acceleration asked for by the objectives together, rad/s².
+    pub max_joint_acceleration: f64,
+}
+
+/// Why settings were refused.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// The file could not be read.
+    #[error("cannot read {file}: {source}; is `--configs` the folder `configs` of this project?")]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not what it should be.
+    #[error("{file}: {source}")]
+    Parse {
+        /// The file.
+        file: PathBuf,
+        /// What the parser said, with the line.
+        source: Box<toml::de::Error>,
+    },
+}
+
+impl Default for WbcSettings {
+    fn default() -> Self {
+        let gains = |kp: f64, kd: f64, max_error: f64, max_acceleration: f64, damping_start: f64| Gains {
+            kp: Vector3::repeat(kp),
+            kd: Vector3::repeat(kd),
+            max_error,
+            max_acceleration,
+            damping_start,
+        };
+        Self {
+            objectives: ObjectiveGains {
+                torso_position: gains(100.0, 1.0, 0.05, 10.0, 0.05),
+                torso_orientation: gains(100.0, 1.0, 0.3, 10.0, 0.05),
+                foot_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
+                gripper_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
+                gripper_orientation: gains(100.0, 10.0, 0.3, 30.0, 0.05),
+                arm_posture: gains(100.0, 10.0, 0.3, 30.0, 0.05),
+            },
+            contact: ContactForceSettings {
+                friction: 0.6,
+                min_vertical: 0.01,
+                max_vertical: 1.5,
+                force_weight: 1e-5,
+                slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
+                failures_to_fault: 3,
+            },
+            max_joint_acceleration: 200.0,
+        }
+    }
+}
+
+impl WbcSettings {
+    /// Reads `wbc.toml`.
+    pub fn load(path: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SettingsError::Read { file: path.to_owned(), source })?;
+        toml::from_str(&text)
+            .map_err(|source| SettingsError::Parse { file: path.to_owned(), source: Box::new(source) })
+    }
+}

@@ -1,0 +1,68 @@
+//! How a control step went: nothing is limited or given up silently.
+
+/// Where the contact forces of a step come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ForceSource {
+    /// No foot stands on the ground: there are none.
+    #[default]
+    NoContact,
+    /// The dense active-set method, which proved that they are optimal.
+    ActiveSet,
+    /// The interior-point method, because the active set could not prove its solution.
+    InteriorPoint,
+    /// The last ones that were feasible, because both methods failed.
+    LastFeasible(ForceFailure),
+}
+
+/// Why no contact forces were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForceFailure {
+    /// The problem held a number that is not finite.
+    NotFinite,
+    /// No forces satisfy the constraints.
+    Infeasible,
+    /// The iteration cap was reached.
+    Iterations,
+    /// The solver reported a numerical failure.
+    Numerical,
+}
+
+/// Why the controller's output can no longer be trusted to balance the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WbcFault {
+    /// The state held a number that is not finite: the last command is repeated.
+    State,
+    /// An objective's reference held a number that is not finite: that objective was left out.
+    Reference,
+    /// No contact forces were found for several steps in a row.
+    Forces(ForceFailure),
+    /// The result held a number that is not finite: the last command is repeated.
+    Output,
+}
+
+/// How a step went.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WbcStatus {
+    /// Where the contact forces come from.
+    pub forces: ForceSource,
+    /// Steps since the start whose forces were not found.
+    pub force_failures: u64,
+    /// Share of the objectives' accelerations that was kept to stay below the joints' limits; 1 normally.
+    pub acceleration_scale: f64,
+    /// Joints whose desired position, velocity or torque was cut to its limit, a bit for each.
+    pub limited: u32,
+    /// Set when the output should not be trusted to balance the robot.
+    pub fault: Option<WbcFault>,
+}
+
+impl Default for WbcStatus {
+    fn default() -> Self {
+        Self {
+            forces: ForceSource::NoContact,
+            force_failures: 0,
+            acceleration_scale: 1.0,
+            limited: 0,
+            fault: None,
+        }
+    }
+}
