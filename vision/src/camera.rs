@@ -55,8 +55,7 @@ impl Camera {
         let inv_z = 1.0 / p.z;
         let ideal = Vector2::new(p.x * inv_z, p.y * inv_z);
         let (distorted, d_distorted) = self.distortion.distort(ideal);
-        let d_ideal =
-            Matrix2x3::new(inv_z, 0.0, -ideal.x * inv_z, 0.0, inv_z, -ideal.y * inv_z);
+        let d_ideal = Matrix2x3::new(inv_z, 0.0, -ideal.x * inv_z, 0.0, inv_z, -ideal.y * inv_z);
         let scale = Matrix2::from_diagonal(&self.focal_px);
         let pixel = Point2::from(scale * distorted + self.center_px);
         Some((pixel, scale * d_distorted * d_ideal))
@@ -146,8 +145,7 @@ fn fisheye(k: &[f64; 4], p: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let theta = r.atan();
     let t2 = theta * theta;
     let theta_d = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
-    let d_theta_d =
-        1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])));
+    let d_theta_d = 1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])));
     let scale = theta_d / r;
     // d(theta_d / r) / dr, with d theta / dr = 1 / (1 + r^2).
     let d_scale = (d_theta_d / (1.0 + r * r) - scale) / r;

@@ -1,10 +1,272 @@
 //! The rig: the calibrated cameras of a room, as a rig file (TOML) describes them.
 
-use crate::camera::Camera;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector2;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::camera::{Camera, Distortion};
+use crate::config::{ConfigError, Fault, PoseEntry, Source};
 
 /// The cameras of a room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
     /// In the order of the file; an index into it names a camera within the program.
     pub cameras: Vec<Camera>,
+    /// Where the images of each camera come from when it is live; as many as there are cameras.
+    pub sources: Vec<CameraSource>,
+}
+
+/// Where the images of a camera come from when it is live.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSource {
+    /// A V4L2 device, e.g. `/dev/video0` (or a link under `/dev/v4l/by-id`).
+    pub device: Option<PathBuf>,
+    /// A video file.
+    pub file: Option<PathBuf>,
+    /// A network stream.
+    pub url: Option<String>,
+    /// Which half of a side-by-side image (ZED over UVC) is this camera; the whole image if absent.
+    pub half: Option<Half>,
+}
+
+/// A half of a side-by-side stereo image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Half {
+    /// The left half.
+    Left,
+    /// The right half.
+    Right,
+}
+
+impl Rig {
+    /// A rig of cameras that have no live source.
+    pub fn new(cameras: Vec<Camera>) -> Self {
+        let sources = vec![CameraSource::default(); cameras.len()];
+        Self { cameras, sources }
+    }
+
+    /// Reads and checks a rig file.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Self::from_source(&Source::read(path)?)
+    }
+
+    /// The index of a camera by its id.
+    pub fn camera_index(&self, id: &str) -> Option<usize> {
+        self.cameras.iter().position(|camera| camera.id == id)
+    }
+
+    fn from_source(source: &Source) -> Result<Self, ConfigError> {
+        let file: RigFile = source.parse()?;
+        let mut rig = Self::new(Vec::new());
+        let mut ids = HashSet::new();
+        for entry in file.camera {
+            let offset = entry.span().start;
+            let entry = entry.into_inner();
+            let (camera, live) = entry.check().map_err(|fault| source.error(offset, fault))?;
+            if !ids.insert(camera.id.clone()) {
+                let problem = format!("camera id `{}` is used twice", camera.id);
+                return Err(source.error(offset, Fault::new(problem, "give each camera its own id")));
+            }
+            rig.cameras.push(camera);
+            rig.sources.push(live);
+        }
+        if rig.cameras.is_empty() {
+            let fault = Fault::new("no camera", "add a [[camera]] table for each camera");
+            return Err(source.error(0, fault));
+        }
+        Ok(rig)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RigFile {
+    #[serde(default)]
+    camera: Vec<Spanned<CameraEntry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraEntry {
+    id: String,
+    width: u32,
+    height: u32,
+    model: Model,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    distortion: Vec<f64>,
+    world_from_camera: PoseEntry,
+    #[serde(default)]
+    source: CameraSource,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Model {
+    Pinhole,
+    Radtan,
+    Fisheye,
+}
+
+impl CameraEntry {
+    fn check(self) -> Result<(Camera, CameraSource), Fault> {
+        let Self { id, width, height, fx, fy, cx, cy, .. } = self;
+        let plain = |letter: char| letter.is_ascii_alphanumeric() || "_-".contains(letter);
+        if id.is_empty() || !id.chars().all(plain) {
+            return Err(Fault::new(
+                format!("camera id `{id}` cannot name a folder or a topic"),
+                "use letters, digits, `_` and `-`",
+            ));
+        }
+        if width == 0 || height == 0 {
+            return Err(Fault::new(
+                format!("camera `{id}` has a size of {width}x{height} pixels"),
+                "write the size of the images that it delivers",
+            ));
+        }
+        if ![fx, fy, cx, cy].iter().chain(&self.distortion).all(|number| number.is_finite()) {
+            return Err(Fault::new(
+                format!("camera `{id}` has an intrinsic that is not finite"),
+                "write plain decimal numbers",
+            ));
+        }
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err(Fault::new(
+                format!("camera `{id}` has focal lengths {fx}, {fy}"),
+                "write positive focal lengths in pixels",
+            ));
+        }
+        let distortion = distortion(self.model, &self.distortion)
+            .map_err(|fault| Fault { problem: format!("camera `{id}`: {}", fault.problem), ..fault })?;
+        let world_from_camera = self.world_from_camera.to_isometry("world_from_camera")?;
+        let camera = Camera {
+            id,
+            width,
+            height,
+            focal_px: Vector2::new(fx, fy),
+            center_px: Vector2::new(cx, cy),
+            distortion,
+            world_from_camera,
+        };
+        Ok((camera, self.source))
+    }
+}
+
+/// Coefficients in OpenCV's order: 4, 5 or 8 for `radtan`, 4 for `fisheye`, none for `pinhole`.
+fn distortion(model: Model, coefficients: &[f64]) -> Result<Distortion, Fault> {
+    let count = coefficients.len();
+    let wrong = |remedy: &str| {
+        Err(Fault::new(format!("{count} distortion coefficients do not fit the model"), remedy))
+    };
+    match model {
+        Model::Pinhole if count == 0 || coefficients.iter().all(|k| *k == 0.0) => Ok(Distortion::Pinhole),
+        Model::Pinhole => wrong("remove `distortion`, or use model = \"radtan\""),
+        Model::Radtan if [4, 5, 8].contains(&count) => {
+            let mut k = [0.0; 8];
+            k[..count].copy_from_slice(coefficients);
+            Ok(Distortion::RadTan(k))
+        }
+        Model::Radtan => wrong("give 4, 5 or 8 of k1, k2, p1, p2, k3, k4, k5, k6"),
+        Model::Fisheye => match coefficients.try_into() {
+            Ok(k) => Ok(Distortion::Fisheye(k)),
+            Err(_) => wrong("give 4: k1, k2, k3, k4 of OpenCV's fisheye model"),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"
+[[camera]]
+id = "left"
+width = 1280
+height = 720
+model = "radtan"
+fx = 700
+fy = 700.5
+cx = 640
+cy = 360
+distortion = [-0.1, 0.01, 0.0, 0.0, 0.002]
+world_from_camera = { xyz = [1.0, 0.0, 1.4], quat = [0.5, -0.5, 0.5, -0.5] }
+source = { device = "/dev/video0", half = "left" }
+"#;
+
+    fn load(text: &str) -> Result<Rig, ConfigError> {
+        Rig::from_source(&Source { path: "rig.toml".into(), text: text.to_owned() })
+    }
+
+    fn complaint(text: &str) -> String {
+        load(text).expect_err("the file is wrong").to_string()
+    }
+
+    #[test]
+    fn a_good_file_is_read_whole() {
+        let sut = load(GOOD).expect("valid");
+        assert_eq!(sut.camera_index("left"), Some(0));
+        assert_eq!(sut.cameras[0].focal_px, Vector2::new(700.0, 700.5));
+        let k = [-0.1, 0.01, 0.0, 0.0, 0.002, 0.0, 0.0, 0.0];
+        assert_eq!(sut.cameras[0].distortion, Distortion::RadTan(k));
+        assert_eq!(sut.sources[0].half, Some(Half::Left));
+    }
+
+    #[test]
+    fn a_typo_is_named_with_its_line_and_a_guess() {
+        let message = complaint(&GOOD.replace("width", "widht"));
+        assert!(message.starts_with("rig.toml:4: unknown field `widht`"), "{message}");
+        assert!(message.ends_with("did you mean `width`?"), "{message}");
+    }
+
+    #[test]
+    fn a_typo_inside_a_pose_is_named_with_its_line() {
+        let message = complaint(&GOOD.replace("quat", "qaut"));
+        assert!(message.starts_with("rig.toml:12:"), "{message}");
+        assert!(message.ends_with("did you mean `quat`?"), "{message}");
+    }
+
+    #[test]
+    fn an_unknown_model_is_answered_with_the_known_ones() {
+        let message = complaint(&GOOD.replace("\"radtan\"", "\"radtam\""));
+        assert!(message.contains("did you mean `radtan`?"), "{message}");
+    }
+
+    #[test]
+    fn a_camera_named_twice_is_refused_where_it_is_named_again() {
+        let message = complaint(&format!("{GOOD}{GOOD}"));
+        assert!(message.starts_with("rig.toml:15: camera id `left` is used twice"), "{message}");
+    }
+
+    #[test]
+    fn numbers_that_make_no_sense_are_refused() {
+        let cases = [
+            ("width = 1280", "width = 0", "0x720"),
+            ("fx = 700", "fx = -700", "focal lengths -700"),
+            ("cy = 360", "cy = nan", "not finite"),
+            ("0.002]", "0.002, 0.0]", "6 distortion coefficients"),
+            ("[0.5, -0.5,", "[0.5, 0.9,", "norm"),
+            ("[1.0, 0.0, 1.4]", "[1.0, inf, 1.4]", "not finite"),
+            ("\"left\"\nwidth", "\"le/ft\"\nwidth", "cannot name a folder"),
+        ];
+        for (good, bad, expected) in cases {
+            assert!(GOOD.contains(good), "{good}");
+            let message = complaint(&GOOD.replace(good, bad));
+            assert!(message.contains(expected) && message.contains("hint: "), "{message}");
+        }
+    }
+
+    #[test]
+    fn an_empty_file_and_a_missing_one_are_errors() {
+        assert!(complaint("").contains("no camera"));
+        let missing = Rig::load(Path::new("/no/such/rig.toml")).expect_err("missing").to_string();
+        assert!(missing.contains("/no/such/rig.toml"), "{missing}");
+    }
 }
