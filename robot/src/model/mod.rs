@@ -19,6 +19,7 @@ mod urdf;
 use std::path::Path;
 
 pub use body::RigidBody;
+pub(crate) use body::point_inertia;
 pub use drives::Drives;
 pub use error::ModelError;
 pub use frame::Frame;
