@@ -1,1 +1,11 @@
-//! tests
+//! The whole system under test: the real programs, over real sockets, on ports of their own.
+//!
+//! The programs come from cargo's target folder: `cargo build --workspace --bins` builds them
+//! (`cargo xtask test` does so first).
+
+pub mod observer;
+pub mod programs;
+pub mod system;
+
+pub use observer::Observer;
+pub use system::{Part, System};

@@ -75,7 +75,6 @@ fn folder() -> PathBuf {
 pub fn run(args: &Args) -> Result<()> {
     setup::ensure(setup::Purpose::Run)?;
     shell::cargo(&["build", "--quiet", "--workspace", "--bins"])?;
-    std::fs::create_dir_all(folder())?;
     let operator = operator_recording()?;
     let places = if args.headless { Places::free()? } else { Places::usual(&args.console) };
 
@@ -224,7 +223,8 @@ fn report(args: &Args) -> Result<()> {
 }
 
 /// Renders the operator once for each state of the files that decide how it looks.
-fn operator_recording() -> Result<PathBuf> {
+pub fn operator_recording() -> Result<PathBuf> {
+    std::fs::create_dir_all(folder())?;
     let mut hasher = DefaultHasher::new();
     for part in ["configs/rigs", "configs/shells", "configs/scenes", "sim/src/operator"] {
         hash_files(Path::new(part), &mut hasher)?;

@@ -30,8 +30,12 @@ pub fn run(command: &mut Command) -> Result<()> {
 
 /// Runs cargo with these arguments.
 pub fn cargo<S: AsRef<OsStr>>(args: &[S]) -> Result<()> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    run(Command::new(cargo).args(args))
+    run(cargo_command().args(args))
+}
+
+/// The cargo that runs this program.
+pub fn cargo_command() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
 /// A program of this workspace, built by `cargo build --workspace --bins`.

@@ -18,7 +18,10 @@ pub fn run(args: &Args) -> Result<()> {
     shell::cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     // The whole-system tests start the programs; `cargo test` alone builds only some of them.
     shell::cargo(&["build", "--workspace", "--bins"])?;
-    shell::cargo(&["test", "--workspace"])?;
+    let operator = std::path::absolute(demo::operator_recording()?)?;
+    shell::run(
+        shell::cargo_command().args(["test", "--workspace"]).env("LOCOMAN_OPERATOR_RECORDING", operator),
+    )?;
     if !args.no_demo {
         headless_demo()?;
     }
