@@ -1,6 +1,34 @@
-//! The simulated robot.
+//! The simulated robot: MuJoCo behind the same boundary as the real one.
+//!
+//! ```text
+//! configs/robot (URDF, drives) ─► mjcf ─► world (MuJoCo) ◄─ drives ◄─ machine ◄─ lockstep | real time
+//! configs/scenes/robot.toml ───────┴─────────────────────────┴──► noise ──┘        (tests)  (UDP, Zenoh)
+//! ```
+
+pub mod drives;
+mod error;
+pub mod jaws;
+pub mod lockstep;
+pub mod machine;
+pub mod mjcf;
+pub mod noise;
+pub mod scene;
+pub mod shapes;
+pub mod world;
 
 use std::path::Path;
+
+pub use error::SimRobotError;
+pub use lockstep::LockstepPlant;
+pub use machine::{Options, SimRobot};
+pub use world::Truth;
+
+/// One exchange: the control period of the robot.
+pub const EXCHANGE_S: f64 = 0.0025;
+/// The same in nanoseconds.
+pub const EXCHANGE_NS: u64 = 2_500_000;
+/// Longest command latency that a profile may ask for, s.
+pub const MAX_LATENCY_S: f64 = 0.05;
 
 /// Arguments of `locoman-sim robot`.
 #[derive(Debug, clap::Args)]

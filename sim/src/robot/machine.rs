@@ -1,0 +1,261 @@
+//! The simulated robot as a machine: commands in, sensors out, one exchange of 2.5 ms at a time.
+//!
+//! ```text
+//! command ─► latency ─► latched ─► joint law and motor limits ─► MuJoCo ─► noise ─► sensors
+//!                                  └──────── every step (2 kHz) ───────┘
+//! ```
+//! The last command stays in force for ever, as on the Go1. Lockstep and real time differ only in who says
+//! when to advance.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use locoman_robot::joints::JointVector;
+use locoman_robot::model::Model;
+use locoman_robot::plant::{JointCommand, Sensors};
+use nalgebra::Vector3;
+
+use super::drives::Drives;
+use super::noise::SensorNoise;
+use super::scene::{Posture, Scene};
+use super::world::{MOTORS, Truth, World};
+use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, mjcf};
+
+/// Commands that can be under way at once: more than arrive within the longest latency.
+const COMMANDS_UNDER_WAY: usize = 64;
+
+/// How to set the robot up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// A profile of the scene file: `hw`, `ideal`.
+    pub profile: String,
+    /// A posture of the scene file: `lying`, `standing`.
+    pub posture: String,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { profile: "hw".into(), posture: "lying".into(), seed: 1 }
+    }
+}
+
+/// A robot in its world.
+#[derive(Debug)]
+pub struct SimRobot {
+    world: World,
+    drives: Drives,
+    noise: SensorNoise,
+    scene: Scene,
+    seed: u64,
+    profile: String,
+    steps_per_exchange: u64,
+    latency_steps: u64,
+    /// Commands that have not come into force, with the step at which they do.
+    under_way: VecDeque<(u64, JointCommand)>,
+    latched: JointCommand,
+    applied: [f64; MOTORS],
+    rejected_commands: u64,
+    /// Steps since time zero, and the clock's reading then.
+    step: u64,
+    epoch_ns: u64,
+    push_until_step: u64,
+}
+
+impl SimRobot {
+    /// Builds the robot of a configuration folder and lets it settle in its posture.
+    pub fn new(configs: &Path, options: &Options) -> Result<Self, SimRobotError> {
+        let scene = Scene::load(configs)?;
+        let model = Model::load(&configs.join("robot"))?;
+        Self::with_model(&model, scene, options)
+    }
+
+    /// The same with a given model and scene.
+    pub fn with_model(model: &Model, scene: Scene, options: &Options) -> Result<Self, SimRobotError> {
+        let profile = scene.profile(&options.profile)?;
+        let world = World::new(&mjcf::write(model, &scene, profile)?)?;
+        let steps = |seconds: f64| (seconds / scene.physics.timestep_s).round() as u64;
+        let mut robot = Self {
+            world,
+            drives: Drives::new(&scene),
+            noise: SensorNoise::new(profile, options.seed),
+            steps_per_exchange: steps(EXCHANGE_S),
+            latency_steps: steps(profile.command_latency_s),
+            seed: options.seed,
+            profile: options.profile.clone(),
+            scene,
+            under_way: VecDeque::with_capacity(COMMANDS_UNDER_WAY),
+            latched: JointCommand::damping(),
+            applied: [0.0; MOTORS],
+            rejected_commands: 0,
+            step: 0,
+            epoch_ns: 0,
+            push_until_step: 0,
+        };
+        robot.reset(&options.posture)?;
+        Ok(robot)
+    }
+
+    /// Starts again from a posture, with the noise of the seed: the same as a new robot.
+    pub fn reset(&mut self, posture: &str) -> Result<(), SimRobotError> {
+        let posture = self.scene.posture(posture)?.clone();
+        self.noise = SensorNoise::new(self.scene.profile(&self.profile)?, self.seed);
+        self.under_way.clear();
+        self.push_until_step = 0;
+        self.world.set_push(Vector3::zeros());
+        self.latched = if posture.held { hold(&posture) } else { JointCommand::damping() };
+        self.world.place(&posture, self.drives.jaw_angle(0.0));
+        for _ in 0..(posture.settle_s / self.scene.physics.timestep_s).round() as u64 {
+            self.step_once();
+        }
+        self.step = 0;
+        Ok(())
+    }
+
+    /// A command that arrives `after_ns` of the present exchange; a nonsensical one is dropped, as a drive
+    /// drops a damaged frame.
+    pub fn send(&mut self, command: &JointCommand, after_ns: u64) {
+        if !is_finite(command) {
+            self.rejected_commands += 1;
+            return;
+        }
+        if self.under_way.len() == COMMANDS_UNDER_WAY {
+            // Faster than any latency allows for: the oldest comes into force early.
+            self.apply_next();
+        }
+        let arrival = self.step + after_ns.div_ceil(self.step_ns());
+        self.under_way.push_back((arrival + self.latency_steps, *command));
+    }
+
+    /// Advances by one exchange and measures.
+    pub fn advance(&mut self) -> Result<Sensors, SimRobotError> {
+        for _ in 0..self.steps_per_exchange {
+            while self.under_way.front().is_some_and(|(due, _)| *due <= self.step) {
+                self.apply_next();
+            }
+            if self.push_until_step != 0 && self.step >= self.push_until_step {
+                self.world.set_push(Vector3::zeros());
+                self.push_until_step = 0;
+            }
+            self.step_once();
+            self.step += 1;
+        }
+        if self.world.is_finite() {
+            Ok(self.measure())
+        } else {
+            Err(SimRobotError::Diverged { time_s: self.time_s() })
+        }
+    }
+
+    /// Everything, exact, at the time of the last sensors.
+    pub fn truth(&mut self) -> Truth {
+        let mut truth = self.world.truth();
+        truth.time_ns = self.time_ns();
+        truth.sim_time_s = self.time_s();
+        truth.opening = self.opening();
+        truth
+    }
+
+    /// A force on the trunk's centre of mass, world axes, from now on.
+    pub fn push(&mut self, force_n: Vector3<f64>, duration_s: f64) {
+        self.world.set_push(force_n);
+        let steps = (duration_s / self.scene.physics.timestep_s).round() as u64;
+        self.push_until_step = self.step + steps.max(1);
+    }
+
+    /// Sets the clock: the sensors' time at time zero.
+    pub fn set_epoch_ns(&mut self, epoch_ns: u64) {
+        self.epoch_ns = epoch_ns;
+    }
+
+    /// The sensors' clock now, ns.
+    pub fn time_ns(&self) -> u64 {
+        self.epoch_ns + self.step / self.steps_per_exchange * EXCHANGE_NS
+    }
+
+    /// Seconds since time zero.
+    pub fn time_s(&self) -> f64 {
+        self.step as f64 * self.scene.physics.timestep_s
+    }
+
+    /// Commands dropped because they held something that is no number.
+    pub fn rejected_commands(&self) -> u64 {
+        self.rejected_commands
+    }
+
+    /// Motor torques of the last step, N m.
+    pub fn applied_torques(&self) -> &[f64; MOTORS] {
+        &self.applied
+    }
+
+    /// The physics, for tests.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    fn apply_next(&mut self) {
+        if let Some((_, command)) = self.under_way.pop_front() {
+            self.latched = command;
+        }
+    }
+
+    fn step_once(&mut self) {
+        self.applied = self.drives.torques(&self.latched, &self.world);
+        self.world.step(&self.applied);
+    }
+
+    fn step_ns(&self) -> u64 {
+        EXCHANGE_NS / self.steps_per_exchange
+    }
+
+    fn opening(&self) -> [f64; 2] {
+        [0, 1].map(|side| self.drives.opening(self.world.angle(JointVector::zeros().len() + side)))
+    }
+
+    fn measure(&mut self) -> Sensors {
+        let torque = JointVector::from_fn(|joint, _| self.applied[joint]);
+        let time_s = self.time_s();
+        let attitude = self.noise.attitude(self.world.attitude(), time_s);
+        Sensors {
+            time_ns: self.time_ns(),
+            position: self.noise.position(&self.world.joint_position()),
+            velocity: self.noise.velocity(&self.world.joint_velocity()),
+            torque: self.noise.torque(&torque),
+            opening: self.opening(),
+            attitude: [attitude.w, attitude.i, attitude.j, attitude.k],
+            gyro: self.noise.gyro(self.world.angular_velocity()).into(),
+            accelerometer: self.noise.accelerometer(self.world.specific_force()).into(),
+            foot_force: self.noise.foot_force(self.world.foot_force()),
+        }
+    }
+}
+
+fn is_finite(command: &JointCommand) -> bool {
+    let JointCommand { position, velocity, torque, kp, kd, opening } = command;
+    [position, velocity, torque, kp, kd]
+        .into_iter()
+        .flat_map(|part| part.iter())
+        .chain(opening)
+        .all(|x| x.is_finite())
+}
+
+/// Holds a posture by joint position alone.
+fn hold(posture: &Posture) -> JointCommand {
+    /// Gains of the authors' start-up: stiff, because nothing else holds the robot.
+    const KP: f64 = 200.0;
+    const KD: f64 = 4.0;
+    let mut command = JointCommand::damping();
+    for joint in 0..12 {
+        command.position[joint] = posture.leg[joint % 3];
+        command.kp[joint] = KP;
+        command.kd[joint] = KD;
+    }
+    for joint in 0..3 {
+        command.position[12 + joint] = posture.right_arm[joint];
+        command.position[15 + joint] = posture.left_arm[joint];
+    }
+    // Zero gains: the servos hold with their own.
+    command.kd.rows_mut(12, 6).fill(0.0);
+    command
+}
