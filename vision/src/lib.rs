@@ -1,6 +1,29 @@
 //! From images to 6D poses of tag-covered shells.
+//!
+//! ```text
+//!  source ──► FrameSet ──► detect ────────► pose ─────────► track ──────► TrackUpdate
+//!  recording  one frame    tags in each     one shell from  filter,       poses, verdicts,
+//!  folder     a camera,    image: whole,    all corners in  prediction,   covariances,
+//!  video      one instant  or predicted     all views       verdict,      tags, durations
+//!  device                  regions                          next regions ─┐
+//!                             ▲                                           │
+//!                             └───────────────────────────────────────────┘
+//!  rig (cameras) and shells (tags) come from files: `configs/rigs`, `configs/shells`
+//! ```
+//!
+//! Entry points: [`Rig::load`](rig::Rig::load), [`ShellSet::load`](shells::ShellSet::load),
+//! [`FrameSets`](source::FrameSets) over a [`FrameSource`](source::FrameSource),
+//! [`Tracker::update`](track::Tracker::update).
+//!
+//! Conventions: metres, radians, nanoseconds; `world_from_shell` maps points of the shell to the world;
+//! pixel centres at integers; corners of a tag in the order bottom left, bottom right, top right, top left.
 
 pub mod camera;
 pub mod config;
+pub mod detect;
+pub mod image;
+pub mod pose;
 pub mod rig;
 pub mod shells;
+pub mod source;
+pub mod track;

@@ -188,8 +188,8 @@ mod tests {
                     && direction.y.atan2(direction.x).abs() < 60_f64.to_radians()
                     && direction.z.abs() < 45_f64.to_radians().sin()
             }
-            // All above a cone below the hand (35 degrees below the horizon), but for the forearm's side.
-            "right_palm" | "left_palm" => direction.z > -0.57 && direction.x > -0.7,
+            // All but 30 degrees and more below the horizon, and but for the forearm's side.
+            "right_palm" | "left_palm" => direction.z > -0.5 && direction.x > -0.5,
             // All but a cone (60 degrees) round the thumb's root.
             _ => direction.x > -0.5,
         }

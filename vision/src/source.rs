@@ -1,0 +1,46 @@
+//! Where frames come from: recordings, folders of images, videos, devices; all behind one trait.
+
+mod folder;
+mod set;
+mod video;
+
+use std::path::PathBuf;
+
+use crate::image::Frame;
+pub use folder::ImageFolder;
+pub use set::{FrameSet, FrameSets};
+pub use video::VideoSource;
+
+/// Delivers the frames of all cameras of a rig, by rising capture time.
+pub trait FrameSource: Send {
+    /// The next frame; `None` at the end.
+    fn next_frame(&mut self) -> Result<Option<Frame>, SourceError>;
+
+    /// Frames that were there but could not be read, so far.
+    fn skipped(&self) -> u64;
+}
+
+/// A source that cannot deliver.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// The source lacks a camera of the rig.
+    #[error("{}: no images of camera `{camera}`\n  hint: {remedy}", path.display())]
+    MissingCamera {
+        /// File or folder.
+        path: PathBuf,
+        /// Id in the rig file.
+        camera: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// The source cannot be opened or read.
+    #[error("{}: {problem}\n  hint: {remedy}", path.display())]
+    Unreadable {
+        /// File, folder or device.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+}
