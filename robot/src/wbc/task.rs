@@ -1,0 +1,138 @@
+//! An objective as three rows: J, its errors, and the acceleration that it asks for.
+
+use nalgebra::Vector3;
+
+use super::{Gains, Objective, PointReference, RotationReference, hierarchy::Rows};
+use crate::{
+    dynamics::{DOF, Dynamics, FrameMotion, State},
+    joints::{Leg, Side},
+    model::Frame,
+};
+
+/// What the hierarchy needs of an objective or a contact.
+#[derive(Debug, Clone)]
+pub(super) struct Task {
+    /// J_i
+    pub(super) rows: Rows,
+    /// x̄_i - x_i
+    pub(super) error: Vector3<f64>,
+    /// The desired velocity.
+    pub(super) velocity: Vector3<f64>,
+    /// ẍ_i^cmd - J̇_i q̇
+    pub(super) acceleration: Vector3<f64>,
+}
+
+impl Task {
+    /// A foot on the ground: it neither moves nor accelerates, so J_c q̈ = -J̇_c q̇.
+    pub(super) fn contact(dynamics: &Dynamics, leg: Leg) -> Self {
+        let foot = dynamics.frame(Frame::Foot(leg));
+        Self {
+            rows: rows(foot, 0),
+            error: Vector3::zeros(),
+            velocity: Vector3::zeros(),
+            acceleration: -linear(&foot.bias_acceleration),
+        }
+    }
+
+    /// An objective; nothing if its reference holds a number that is not finite.
+    pub(super) fn objective(
+        objective: &Objective,
+        dynamics: &Dynamics,
+        state: &State,
+        gains: &Gains,
+    ) -> Option<Self> {
+        let task = match objective {
+            Objective::TorsoPosition(reference) => {
+                Self::point(dynamics.frame(Frame::Torso), reference, gains)
+            }
+            Objective::TorsoOrientation(reference) => {
+                Self::rotation(dynamics.frame(Frame::Torso), reference, gains)
+            }
+            Objective::FootPosition(leg, reference) => {
+                Self::point(dynamics.frame(Frame::Foot(*leg)), reference, gains)
+            }
+            Objective::GripperPosition(side, reference) => {
+                Self::point(dynamics.frame(Frame::Gripper(*side)), reference, gains)
+            }
+            Objective::GripperOrientation(side, reference) => {
+                Self::rotation(dynamics.frame(Frame::Gripper(*side)), reference, gains)
+            }
+            Objective::ArmPosture(side, reference) => Self::posture(state, *side, reference, gains),
+        };
+        let vectors = [&task.error, &task.velocity, &task.acceleration];
+        vectors.iter().all(|vector| vector.iter().all(|entry| entry.is_finite())).then_some(task)
+    }
+
+    /// A frame's origin in the world.
+    fn point(frame: &FrameMotion, reference: &PointReference, gains: &Gains) -> Self {
+        Self::commanded(
+            rows(frame, 0),
+            reference.position - frame.world_from_frame.translation.vector,
+            [reference.velocity, linear(&frame.velocity)],
+            reference.acceleration,
+            linear(&frame.bias_acceleration),
+            gains,
+        )
+    }
+
+    /// A frame's orientation in the world: the error is log(R̄ Rᵀ), the shortest rotation to the reference.
+    fn rotation(frame: &FrameMotion, reference: &RotationReference, gains: &Gains) -> Self {
+        let rotation = &frame.world_from_frame.rotation;
+        Self::commanded(
+            rows(frame, 3),
+            (reference.orientation * rotation.inverse()).scaled_axis(),
+            [reference.angular_velocity, angular(&frame.velocity)],
+            reference.angular_acceleration,
+            angular(&frame.bias_acceleration),
+            gains,
+        )
+    }
+
+    /// The joints of an arm.
+    fn posture(state: &State, side: Side, reference: &PointReference, gains: &Gains) -> Self {
+        let first = side.first_arm_joint();
+        let mut rows = [[0.0; DOF]; 3];
+        for (index, row) in rows.iter_mut().enumerate() {
+            row[6 + first + index] = 1.0;
+        }
+        let position = state.position.fixed_rows::<3>(first);
+        let velocity = state.velocity.fixed_rows::<3>(first).into_owned();
+        Self::commanded(
+            rows,
+            reference.position - position,
+            [reference.velocity, velocity],
+            reference.acceleration,
+            Vector3::zeros(),
+            gains,
+        )
+    }
+
+    /// ẍ^cmd = ẍ̄ + K_p (x̄ - x) + K_d (ẋ̄ - ẋ), the paper's acceleration command, with its error and its
+    /// length limited.
+    fn commanded(
+        rows: Rows,
+        error: Vector3<f64>,
+        [desired, velocity]: [Vector3<f64>; 2],
+        feed_forward: Vector3<f64>,
+        bias: Vector3<f64>,
+        gains: &Gains,
+    ) -> Self {
+        let error = error.cap_magnitude(gains.max_error);
+        let feedback = gains.kp.component_mul(&error) + gains.kd.component_mul(&(desired - velocity));
+        let command = (feed_forward + feedback).cap_magnitude(gains.max_acceleration);
+        Self { rows, error, velocity: desired, acceleration: command - bias }
+    }
+}
+
+/// Three rows of a frame's Jacobian: from 0 linear, from 3 angular.
+fn rows(frame: &FrameMotion, first: usize) -> Rows {
+    std::array::from_fn(|row| std::array::from_fn(|column| frame.jacobian[(first + row, column)]))
+}
+
+fn linear(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
+    twist.fixed_rows::<3>(0).into_owned()
+}
+
+fn angular(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
+    twist.fixed_rows::<3>(3).into_owned()
+}
