@@ -204,6 +204,23 @@ fn small_session() -> Vec<u8> {
     fs::read(&*file).unwrap()
 }
 
+/// Where the record that ends the data section begins.
+fn data_section_end(bytes: &[u8]) -> usize {
+    let mut offset = mcap::MAGIC.len();
+    while bytes[offset] != mcap::records::op::DATA_END {
+        offset += 9 + u64::from_le_bytes(bytes[offset + 1..offset + 9].try_into().unwrap()) as usize;
+    }
+    offset
+}
+
+#[test]
+fn a_reader_that_failed_has_ended() {
+    let bytes = small_session();
+    let mut reader = Reader::open(&*TestFile::with(&bytes[..bytes.len() / 2])).unwrap();
+    assert!(reader.by_ref().any(|message| message.is_err()));
+    assert!(reader.next().is_none());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
@@ -228,22 +245,32 @@ proptest! {
     fn changed_bytes_are_noticed_and_never_panic(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let mut bytes = small_session();
-        let (whole, _) = read(&TestFile::with(&bytes));
-        let data_section = bytes.len() / 2;
+        let original = small_session();
+        let (whole, _) = read(&TestFile::with(&original));
+        // The magic stays: without it the file is another's.
+        let data_bytes = data_section_end(&original) - mcap::MAGIC.len();
+        let mut bytes = original.clone();
         for (place, value) in changes {
-            // The magic stays: without it the file is another's.
-            let place = 8 + place.index(data_section - 8);
-            bytes[place] = value;
+            bytes[mcap::MAGIC.len() + place.index(data_bytes)] = value;
         }
         let file = TestFile::with(&bytes);
-        let mut reader = Reader::open(&*file).unwrap();
-        let messages: Vec<_> = reader.by_ref().map_while(Result::ok).collect();
+        let (messages, error) = read(&file);
+        prop_assert_eq!(error.is_some(), bytes != original);
         prop_assert!(messages.len() <= whole.len());
-        prop_assert!(reader.next().is_none(), "an iterator that failed has ended");
         for message in &messages {
             let _ = message.decode::<Event>();
         }
+        let _ = Overview::read(&*file);
+    }
+
+    #[test]
+    fn a_changed_summary_never_panics(place in any::<prop::sample::Index>(), value: u8) {
+        let mut bytes = small_session();
+        let begin = data_section_end(&bytes);
+        let place = begin + place.index(bytes.len() - begin);
+        bytes[place] = value;
+        let file = TestFile::with(&bytes);
+        let _ = read(&file);
         let _ = Overview::read(&*file);
     }
 

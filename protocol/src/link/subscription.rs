@@ -10,7 +10,7 @@ use zenoh::Wait;
 /// A message and when it came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Received<M> {
-    /// The message. Its numbers are unchecked: see [`crate::validate`].
+    /// The message. Its numbers are unchecked: see [`crate::validate()`].
     pub message: M,
     /// When it arrived, on this machine's monotonic clock. Staleness is measured from here.
     pub received_ns: u64,
