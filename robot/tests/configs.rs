@@ -1,5 +1,7 @@
 //! The files in `configs/robot` against what they stand for.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::path::{Path, PathBuf};
 
 use locoman_robot::{

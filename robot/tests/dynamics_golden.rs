@@ -3,6 +3,8 @@
 //! `golden/model.urdf` is the published LocoMan model without meshes; `golden/dynamics.json` holds 12 random
 //! states of it evaluated with Pinocchio 4.1.0 (conventions are written in the file).
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::path::{Path, PathBuf};
 
 use locoman_robot::{

@@ -1,5 +1,7 @@
 //! Laws of the whole-body controller, over random states.
 
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
 use std::path::Path;
 
 use locoman_robot::{

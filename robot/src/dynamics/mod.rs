@@ -210,7 +210,8 @@ impl Dynamics {
         block.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() * whole.mass));
         block.fixed_view_mut::<3, 3>(0, 3).copy_from(&-moment);
         block.fixed_view_mut::<3, 3>(3, 0).copy_from(&moment);
-        block.fixed_view_mut::<3, 3>(3, 3).copy_from(&whole.rotational);
+        let rotational = (whole.rotational + whole.rotational.transpose()) * 0.5;
+        block.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotational);
     }
 
     /// Pose, Jacobian, velocity and bias acceleration of a frame; its joint columns are those between it and

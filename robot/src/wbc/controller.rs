@@ -203,3 +203,6 @@ impl WholeBodyController {
         output
     }
 }
+
+#[cfg(test)]
+mod tests;
