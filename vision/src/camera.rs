@@ -152,3 +152,6 @@ fn fisheye(k: &[f64; 4], p: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let unit = p / r;
     (p * scale, Matrix2::identity() * scale + p * unit.transpose() * d_scale)
 }
+
+#[cfg(test)]
+mod tests;

@@ -147,7 +147,7 @@ mod tests {
         let mat = Mat::new_rows_cols_with_data(2, 3, sut.data()).expect("mat");
         let mut bytes = Vector::<u8>::new();
         imgcodecs::imencode(".png", &mat, &mut bytes, &Vector::new()).expect("encode");
-        let pixels = Pixels::Encoded(bytes.to_vec());
+        let pixels = Pixels::Encoded(bytes.iter().collect());
         assert_eq!(*pixels.to_gray().expect("decode"), sut);
         assert_eq!(sut.row(1), [150, 200, 255]);
     }

@@ -27,3 +27,6 @@ pub mod rig;
 pub mod shells;
 pub mod source;
 pub mod track;
+
+#[cfg(test)]
+mod testing;

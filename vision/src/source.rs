@@ -1,13 +1,18 @@
 //! Where frames come from: recordings, folders of images, videos, devices; all behind one trait.
 
 mod folder;
+mod recording;
 mod set;
 mod video;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use locoman_protocol::recording::RecordingError;
 
 use crate::image::Frame;
+use crate::rig::Rig;
 pub use folder::ImageFolder;
+pub use recording::Recording;
 pub use set::{FrameSet, FrameSets};
 pub use video::VideoSource;
 
@@ -18,6 +23,24 @@ pub trait FrameSource: Send {
 
     /// Frames that were there but could not be read, so far.
     fn skipped(&self) -> u64;
+}
+
+impl<S: FrameSource + ?Sized> FrameSource for Box<S> {
+    fn next_frame(&mut self) -> Result<Option<Frame>, SourceError> {
+        (**self).next_frame()
+    }
+
+    fn skipped(&self) -> u64 {
+        (**self).skipped()
+    }
+}
+
+/// Opens a recording: an MCAP file, or a folder of images.
+pub fn open_recording(path: &Path, rig: &Rig) -> Result<Box<dyn FrameSource>, SourceError> {
+    if path.is_dir() {
+        return Ok(Box::new(ImageFolder::open(path, rig)?));
+    }
+    Ok(Box::new(Recording::open(path, rig)?))
 }
 
 /// A source that cannot deliver.
@@ -43,4 +66,10 @@ pub enum SourceError {
         /// What to do.
         remedy: String,
     },
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }
+
+#[cfg(test)]
+mod tests;

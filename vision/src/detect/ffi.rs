@@ -51,8 +51,10 @@ impl<'a> View<'a> {
 pub(super) struct Engine {
     detector: NonNull<sys::apriltag_detector_t>,
     family: NonNull<sys::apriltag_family_t>,
-    /// The id of each code that the family still holds.
+    /// The id of each code that the family holds.
     ids: Vec<u32>,
+    /// What the family's `codes` points to: the library's own table is shared by all families.
+    codes: Vec<u64>,
 }
 
 // SAFETY: the detector and its family are owned by the engine alone and hold no thread-local state.
@@ -71,18 +73,19 @@ impl Engine {
             unsafe { sys::tag36h11_destroy(family.as_ptr()) };
             return Err(DetectorError::OutOfMemory);
         };
-        let engine = Self { detector, family, ids };
-        // SAFETY: `codes` holds `ncodes` numbers; `ids` rises, so that code `id >= slot` is moved down
-        // onto one that has been moved already or is not wanted. The family is handed over afterwards.
+        let mut engine = Self { detector, family, ids, codes: Vec::new() };
+        // SAFETY: the library's `codes` holds `ncodes` numbers, which are copied. Ours outlive the family,
+        // and the vector is not changed any more. The family is handed over after that.
         unsafe {
             let family = &mut *engine.family.as_ptr();
-            for (slot, &id) in engine.ids.iter().enumerate() {
+            for &id in &engine.ids {
                 if id >= family.ncodes {
                     return Err(DetectorError::UnknownId(id));
                 }
-                *family.codes.add(slot) = *family.codes.add(id as usize);
+                engine.codes.push(*family.codes.add(id as usize));
             }
-            family.ncodes = u32::try_from(engine.ids.len()).unwrap_or(0);
+            family.codes = engine.codes.as_mut_ptr();
+            family.ncodes = u32::try_from(engine.codes.len()).unwrap_or(0);
             let detector = &mut *engine.detector.as_ptr();
             detector.nthreads = 1;
             detector.refine_edges = true;

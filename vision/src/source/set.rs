@@ -87,7 +87,8 @@ mod tests {
     }
 
     fn sets(frames: &[(usize, u64)]) -> Vec<Vec<(usize, u64)>> {
-        let mut sut = FrameSets::new(Script(frames.to_vec().into_iter()), 2, 10);
+        let script = Script(Vec::from(frames).into_iter());
+        let mut sut = FrameSets::new(script, 2, 10);
         let mut sets = Vec::new();
         while let Some(set) = sut.next_set().expect("no errors here") {
             sets.push(set.frames.iter().map(|frame| (frame.camera, frame.capture_ns)).collect());
