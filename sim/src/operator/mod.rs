@@ -1,6 +1,40 @@
 //! The operator's side without cameras: images of tag shells along a scripted motion, with the truth.
+//!
+//! ```text
+//! scene file ─► motion ─► posture ─► view (shells, limbs) ─► render ─► sensor ─► encode ─► output
+//! rig file ───► lens (rays), room ─────────────────────────────┘
+//! shells file ► solid ─► ink
+//! ```
 
+pub mod body;
+pub mod encode;
+pub mod ink;
+pub mod lens;
+pub mod motion;
+pub mod output;
+pub mod render;
+pub mod room;
+pub mod scene;
+pub mod sensor;
+pub mod sight;
+pub mod solid;
+pub mod studio;
+pub mod view;
+
+use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Instant as Clock;
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use locoman_vision::rig::Rig;
+use locoman_vision::shells::ShellSet;
+use rayon::prelude::*;
+
+use motion::Body;
+use output::{Folder, Image, Instant, Output, Recording, TruthFile};
+use scene::Scene;
+use studio::Studio;
 
 /// Arguments of `locoman-sim operator`.
 #[derive(Debug, clap::Args)]
@@ -34,7 +68,181 @@ pub struct Args {
     pub seed: u64,
 }
 
+/// Capture time of the first picture: a round number, so that times are easy to read.
+pub const FIRST_CAPTURE_NS: u64 = 1_000_000_000;
+/// Instants that are rendered before any is written: enough to keep many cores busy, few to hold.
+const BATCH: u64 = 8;
+
+/// The files that a rendering is made from.
+#[derive(Debug)]
+pub struct Inputs {
+    /// The cameras.
+    pub rig: PathBuf,
+    /// The shells.
+    pub shells: PathBuf,
+    /// Motion, light and sensor.
+    pub scene: PathBuf,
+}
+
+impl Inputs {
+    /// The default files in a folder of configurations.
+    pub fn standard(configs: &Path) -> Self {
+        Self {
+            rig: configs.join("rigs/two_zed_pairs.toml"),
+            shells: configs.join("shells/standard.toml"),
+            scene: configs.join("scenes/operator.toml"),
+        }
+    }
+
+    /// Reads them, and prepares the studio.
+    pub fn studio(&self, seed: u64) -> anyhow::Result<Studio> {
+        let rig = Rig::load(&self.rig)?;
+        let shells = ShellSet::load(&self.shells)?;
+        let scene = Scene::read(&self.scene)?;
+        Studio::new(&rig, &shells, scene, seed)
+            .with_context(|| format!("cannot render the shells of {}", self.shells.display()))
+    }
+}
+
+/// When pictures are taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Schedule {
+    /// Pictures of each camera.
+    pub count: u64,
+    /// Pictures a second.
+    pub rate_hz: f64,
+}
+
+impl Schedule {
+    /// As many as fit into a length of time.
+    pub fn new(seconds: f64, rate_hz: f64) -> anyhow::Result<Self> {
+        anyhow::ensure!(
+            (0.1..=1000.0).contains(&rate_hz),
+            "--rate {rate_hz}: must lie between 0.1 and 1000 images a second"
+        );
+        let count = (seconds * rate_hz).round();
+        anyhow::ensure!(
+            (1.0..1e7).contains(&count),
+            "--seconds {seconds} at {rate_hz} Hz are {count} images: give a longer time"
+        );
+        Ok(Self { count: count as u64, rate_hz })
+    }
+
+    /// Scene time of a picture.
+    pub fn time_s(&self, number: u64) -> f64 {
+        number as f64 / self.rate_hz
+    }
+
+    /// Capture time of a picture.
+    pub fn capture_ns(&self, number: u64) -> u64 {
+        FIRST_CAPTURE_NS + (self.time_s(number) * 1e9).round() as u64
+    }
+}
+
 /// Runs `locoman-sim operator`.
-pub fn run(_args: &Args, _configs: &Path) -> anyhow::Result<()> {
-    anyhow::bail!("`locoman-sim operator` is not built yet")
+pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
+    let standard = Inputs::standard(configs);
+    let inputs = Inputs {
+        rig: args.rig.clone().unwrap_or(standard.rig),
+        shells: args.shells.clone().unwrap_or(standard.shells),
+        scene: args.scene.clone().unwrap_or(standard.scene),
+    };
+    let studio = inputs.studio(args.seed)?;
+    let seconds = args.seconds.unwrap_or(studio.scene().motion.period_s);
+    let schedule = Schedule::new(seconds, args.rate)?;
+
+    let mut outputs: Vec<Box<dyn Output>> = Vec::new();
+    if let Some(path) = &args.output {
+        outputs.push(Box::new(create_recording(path, &inputs)?));
+    }
+    if let Some(path) = &args.folder {
+        outputs.push(Box::new(Folder::create(path, studio.cameras().map(|camera| camera.id.as_str()))?));
+    }
+    if let Some(path) = &args.truth {
+        outputs.push(Box::new(TruthFile::create(path)?));
+    }
+    let formats = Formats { jpeg: args.output.is_some(), png: args.folder.is_some() };
+
+    let started = Clock::now();
+    render_to(&studio, schedule, formats, &mut outputs)?;
+    for output in outputs {
+        output.finish()?;
+    }
+    let images = schedule.count * studio.cameras().len() as u64;
+    let elapsed_s = started.elapsed().as_secs_f64();
+    tracing::info!("{images} images in {elapsed_s:.1} s, {:.1} ms each", 1e3 * elapsed_s / images as f64);
+    Ok(())
+}
+
+/// Begins a recording that carries the files it was made from.
+pub fn create_recording(path: &Path, inputs: &Inputs) -> anyhow::Result<Recording> {
+    let read =
+        |path: &Path| fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
+    let (rig, shells, scene) = (read(&inputs.rig)?, read(&inputs.shells)?, read(&inputs.scene)?);
+    Recording::create(path, &[("rig.toml", &rig), ("shells.toml", &shells), ("scene.toml", &scene)])
+}
+
+/// Which encodings the outputs need.
+#[derive(Debug, Clone, Copy)]
+pub struct Formats {
+    /// For recordings.
+    pub jpeg: bool,
+    /// For folders.
+    pub png: bool,
+}
+
+/// Renders all pictures, on all cores, and hands them to the outputs in the order of time.
+pub fn render_to(
+    studio: &Studio,
+    schedule: Schedule,
+    formats: Formats,
+    outputs: &mut [Box<dyn Output>],
+) -> anyhow::Result<()> {
+    let bodies: Vec<Body> = studio.solids().iter().map(|solid| solid.body).collect();
+    let cameras: Vec<&str> = studio.cameras().map(|camera| camera.id.as_str()).collect();
+    let progress = progress_bar(schedule.count);
+    for start in (0..schedule.count).step_by(BATCH as usize) {
+        let numbers = start..(start + BATCH).min(schedule.count);
+        let pictures = numbers
+            .clone()
+            .flat_map(|number| (0..cameras.len()).map(move |camera| (number, camera)))
+            .collect::<Vec<_>>();
+        let mut images = pictures
+            .into_par_iter()
+            .map(|(number, camera)| -> anyhow::Result<Image<'_>> {
+                let picture = studio.picture(camera, schedule.time_s(number), number);
+                Ok(Image {
+                    camera: cameras[camera],
+                    jpeg: formats.jpeg.then(|| encode::jpeg(&picture)).transpose()?,
+                    png: formats.png.then(|| encode::png(&picture)).transpose()?,
+                })
+            })
+            .collect::<anyhow::Result<Vec<_>>>()?
+            .into_iter();
+        for number in numbers {
+            let instant = Instant {
+                capture_ns: schedule.capture_ns(number),
+                number,
+                posture: studio.scene().motion.posture(schedule.time_s(number)),
+                bodies: &bodies,
+                images: images.by_ref().take(cameras.len()).collect(),
+            };
+            for output in outputs.iter_mut() {
+                output.add(&instant)?;
+            }
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    Ok(())
+}
+
+/// Draws on a terminal only.
+fn progress_bar(instants: u64) -> ProgressBar {
+    let bar = ProgressBar::new(instants);
+    let template = "rendering the operator {bar:40} {pos}/{len} instants, {eta} left";
+    match ProgressStyle::with_template(template) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
 }

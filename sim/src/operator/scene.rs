@@ -1,0 +1,138 @@
+//! The scene file: motion, light and sensor. Its default, `configs/scenes/operator.toml`, is its manual.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::motion::{Axis, Body, Motion};
+
+/// A scene file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file cannot be read.
+    #[error("cannot read the scene file {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// A key or a value is wrong; the text shows the line.
+    #[error("{path}: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        source: Box<toml::de::Error>,
+    },
+    /// A value is out of its range.
+    #[error("{path}: {message}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        message: String,
+    },
+}
+
+/// All that a rendering needs beside rig, shells and seed.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// How the shells move.
+    pub motion: Motion,
+    /// How they are lit.
+    pub light: Light,
+    /// How the cameras take it.
+    pub sensor: Sensor,
+}
+
+/// One distant lamp, light from everywhere, and a gradient over the room.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Direction towards the lamp, in the world.
+    pub towards_lamp: [f64; 3],
+    /// Share of the lamp on a surface that faces it.
+    pub lamp: f64,
+    /// Share of the light from everywhere.
+    pub ambient: f64,
+    /// Relative change of all light per metre along the world's axes, from the chest.
+    pub gradient_per_m: [f64; 3],
+}
+
+/// Lens and sensor apart from the camera model.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// Time for which the shutter is open, centred on the capture time; global shutter.
+    pub exposure_s: f64,
+    /// Standard deviation of the lens's Gaussian point-spread function, in pixels.
+    pub defocus_px: f64,
+    /// Grey level of a white surface in full light.
+    pub white_level: f64,
+    /// Grey level of darkness.
+    pub black_level: f64,
+    /// Standard deviation of the read noise, in grey levels.
+    pub read_noise: f64,
+    /// Variance of the shot noise per grey level of signal.
+    pub shot_noise: f64,
+    /// Loss of light at a ray of 45 degrees from the optical axis.
+    pub vignetting: f64,
+}
+
+impl Scene {
+    /// Reads and checks a scene file.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+        let scene: Self = toml::from_str(&text)
+            .map_err(|source| SceneError::Parse { path: path.to_owned(), source: Box::new(source) })?;
+        match scene.fault() {
+            Some(message) => Err(SceneError::Value { path: path.to_owned(), message }),
+            None => Ok(scene),
+        }
+    }
+
+    /// The first value out of range, in words.
+    fn fault(&self) -> Option<String> {
+        let motion = &self.motion;
+        if !(motion.period_s > 0.0 && motion.period_s.is_finite()) {
+            return Some(format!("period_s = {} must be positive", motion.period_s));
+        }
+        for term in &motion.terms {
+            let thumb = matches!(term.body, Body::RightThumb | Body::LeftThumb);
+            if thumb != (term.axis == Axis::Open) {
+                return Some(format!(
+                    "term of {} moves {:?}: thumbs move along `open`, others along x … yaw",
+                    term.body.name(),
+                    term.axis
+                ));
+            }
+            if !(term.begin_s >= 0.0 && term.end_s <= motion.period_s && term.ramp_s > 0.0) {
+                return Some(format!(
+                    "term of {} from {} s to {} s, ramp {} s: must lie in 0 … period_s = {}, ramp above 0",
+                    term.body.name(),
+                    term.begin_s,
+                    term.end_s,
+                    term.ramp_s,
+                    motion.period_s
+                ));
+            }
+        }
+        let sensor = &self.sensor;
+        let ranges = [
+            ("exposure_s", sensor.exposure_s, 0.0, 0.1),
+            ("defocus_px", sensor.defocus_px, 0.0, 5.0),
+            ("white_level", sensor.white_level, 1.0, 1000.0),
+            ("black_level", sensor.black_level, 0.0, 100.0),
+            ("read_noise", sensor.read_noise, 0.0, 50.0),
+            ("shot_noise", sensor.shot_noise, 0.0, 10.0),
+            ("vignetting", sensor.vignetting, 0.0, 1.0),
+        ];
+        ranges
+            .iter()
+            .find(|(_, value, low, high)| !(low..=high).contains(&value))
+            .map(|(name, value, low, high)| format!("{name} = {value} must lie between {low} and {high}"))
+    }
+}
