@@ -47,6 +47,22 @@ fn an_unknown_key_is_refused_with_its_line() {
 }
 
 #[test]
+fn a_setting_that_makes_no_sense_is_refused_by_its_key() {
+    let text = std::fs::read_to_string(configs().join("wbc.toml")).unwrap();
+    let path = std::env::temp_dir().join(format!("locoman-{}-friction.toml", std::process::id()));
+    for (from, to, key) in [
+        ("friction = 0.6", "friction = -0.6", "contact.friction"),
+        ("max_vertical = 1.5", "max_vertical = 0.0", "contact.max_vertical"),
+        ("max_error = 0.05", "max_error = 0.0", "objectives.torso_position"),
+    ] {
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let error = WbcSettings::load(&path).unwrap_err().to_string();
+        assert!(error.contains(key), "{error}");
+    }
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
 fn our_model_differs_from_the_published_one_only_in_the_stated_corrections() {
     let ours = Model::load(&configs()).unwrap();
     let published = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/model.urdf");

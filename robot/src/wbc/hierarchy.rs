@@ -24,6 +24,9 @@ pub(super) type Rows = [[f64; DOF]; 3];
 /// Directions whose singular value is below this share of the task's Jacobian are none.
 const RANK_TOLERANCE: f64 = 1e-7;
 
+/// Above this share one pass of Gram-Schmidt leaves directions orthogonal to 1e-14.
+const WELL_CONDITIONED: f64 = 0.1;
+
 /// Solutions of a stack of tasks, for `N` right-hand sides at once.
 #[derive(Debug, Clone)]
 pub(super) struct TaskChain<const N: usize> {
@@ -73,26 +76,26 @@ impl<const N: usize> TaskChain<N> {
     /// J_pre and its singular value decomposition.
     pub(super) fn project(&self, rows: &Rows) -> Projected {
         let mut free = *rows;
-        for row in &mut free {
-            self.remove_used(row);
-        }
+        self.remove_used(&mut free);
         let gram = Matrix3::from_fn(|row, column| dot(&free[row], &free[column]));
         let (left, squares) = eigen(gram);
-        let least = RANK_TOLERANCE * rows.iter().map(|row| dot(row, row)).sum::<f64>().sqrt();
+        let size = rows.iter().map(|row| dot(row, row)).sum::<f64>().sqrt();
 
         let mut projected = Projected { left, singular: [0.0; 3], directions: [[0.0; DOF]; 3] };
         for index in 0..3 {
             let singular = squares[index].max(0.0).sqrt();
             // The last condition keeps rounding from offering more directions than there are.
-            if singular <= least || self.rank + index >= DOF {
+            if singular <= RANK_TOLERANCE * size || self.rank + index >= DOF {
                 continue;
             }
             let mut direction = [0.0; DOF];
             for row in 0..3 {
                 add(&mut direction, left[(row, index)] / singular, &free[row]);
             }
-            // Once more, now that rounding has been blown up by 1/σ: against what is used, and its siblings.
-            self.remove_used(&mut direction);
+            // Where 1/σ blew rounding up, once more.
+            if singular < WELL_CONDITIONED * size {
+                self.remove_used(std::array::from_mut(&mut direction));
+            }
             for sibling in 0..index {
                 let along = dot(&projected.directions[sibling], &direction);
                 add(&mut direction, -along, &projected.directions[sibling]);
@@ -130,11 +133,13 @@ impl<const N: usize> TaskChain<N> {
         }
     }
 
-    /// row ← row (1 - Q Qᵀ), by modified Gram-Schmidt.
-    fn remove_used(&self, row: &mut [f64; DOF]) {
+    /// rows ← rows (1 - Q Qᵀ), by modified Gram-Schmidt; the rows side by side keep the processor busy.
+    fn remove_used<const ROWS: usize>(&self, rows: &mut [[f64; DOF]; ROWS]) {
         for used in &self.basis[..self.rank] {
-            let along = dot(used, row);
-            add(row, -along, used);
+            let along: [f64; ROWS] = std::array::from_fn(|row| dot(used, &rows[row]));
+            for (row, along) in rows.iter_mut().zip(along) {
+                add(row, -along, used);
+            }
         }
     }
 }

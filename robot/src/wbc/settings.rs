@@ -104,6 +104,16 @@ pub enum SettingsError {
         /// What the parser said, with the line.
         source: Box<toml::de::Error>,
     },
+    /// A number that makes no sense.
+    #[error("{file}: `{key}` must be {expected}")]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// The key, or its table.
+        key: &'static str,
+        /// What it must be.
+        expected: &'static str,
+    },
 }
 
 impl Default for WbcSettings {
@@ -142,7 +152,45 @@ impl WbcSettings {
     pub fn load(path: &Path) -> Result<Self, SettingsError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SettingsError::Read { file: path.to_owned(), source })?;
-        toml::from_str(&text)
-            .map_err(|source| SettingsError::Parse { file: path.to_owned(), source: Box::new(source) })
+        let settings: Self = toml::from_str(&text)
+            .map_err(|source| SettingsError::Parse { file: path.to_owned(), source: Box::new(source) })?;
+        match settings.flaw() {
+            None => Ok(settings),
+            Some((key, expected)) => Err(SettingsError::Value { file: path.to_owned(), key, expected }),
+        }
+    }
+
+    /// The first key whose number makes no sense, and what it must be.
+    fn flaw(&self) -> Option<(&'static str, &'static str)> {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let objectives = &self.objectives;
+        let tables = [
+            ("objectives.torso_position", &objectives.torso_position),
+            ("objectives.torso_orientation", &objectives.torso_orientation),
+            ("objectives.foot_position", &objectives.foot_position),
+            ("objectives.gripper_position", &objectives.gripper_position),
+            ("objectives.gripper_orientation", &objectives.gripper_orientation),
+            ("objectives.arm_posture", &objectives.arm_posture),
+        ];
+        for (table, gains) in tables {
+            if !gains.kp.iter().chain(&gains.kd).all(|gain| *gain >= 0.0 && gain.is_finite()) {
+                return Some((table, "given gains kp and kd of at least 0"));
+            }
+            if ![gains.max_error, gains.max_acceleration, gains.damping_start].into_iter().all(positive) {
+                return Some((table, "given max_error, max_acceleration and damping_start above 0"));
+            }
+        }
+        let contact = &self.contact;
+        let least = contact.min_vertical;
+        let checks = [
+            ("max_joint_acceleration", positive(self.max_joint_acceleration), "above 0 rad/s2"),
+            ("contact.friction", positive(contact.friction), "above 0"),
+            ("contact.min_vertical", least >= 0.0 && least.is_finite(), "at least 0 body weights"),
+            ("contact.max_vertical", contact.max_vertical > least, "above contact.min_vertical"),
+            ("contact.force_weight", positive(contact.force_weight), "above 0"),
+            ("contact.slack_weight", contact.slack_weight.into_iter().all(positive), "six numbers above 0"),
+            ("contact.failures_to_fault", contact.failures_to_fault > 0, "at least 1"),
+        ];
+        checks.into_iter().find(|(_, sound, _)| !sound).map(|(key, _, expected)| (key, expected))
     }
 }
