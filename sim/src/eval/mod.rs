@@ -1,32 +1,47 @@
 //! Evaluations: each runs one reproducible experiment and reports its figures.
 //!
-//! To add one: a module with `run`, and a variant of [`Name`].
+//! To add one: a module with `run`, and a variant of [`Experiment`].
+
+pub mod demo;
+pub mod report;
+pub mod statistics;
 
 use std::path::{Path, PathBuf};
+
+pub use report::{Figure, Must, Report};
 
 /// Arguments of `locoman-sim eval`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Which experiment.
-    pub name: Name,
+    #[command(subcommand)]
+    pub experiment: Experiment,
     /// Where to write the report; its plots go beside it.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", global = true)]
     pub json: Option<PathBuf>,
     /// Seed of everything random in it.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, global = true)]
     pub seed: u64,
 }
 
 /// The experiments.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Name {
+#[derive(Debug, Clone, PartialEq, Eq, clap::Subcommand)]
+pub enum Experiment {
     /// Poses from rendered images against the truth.
     Vision,
+    /// A recorded session of the demo: following, latency, control period.
+    Demo {
+        /// What the station recorded.
+        #[arg(long, value_name = "SESSION")]
+        recording: PathBuf,
+    },
 }
 
 /// Runs `locoman-sim eval`.
 pub fn run(args: &Args, _configs: &Path) -> anyhow::Result<()> {
-    match args.name {
-        Name::Vision => anyhow::bail!("`locoman-sim eval vision` is not built yet"),
-    }
+    let report = match &args.experiment {
+        Experiment::Vision => anyhow::bail!("`locoman-sim eval vision` is not built yet"),
+        Experiment::Demo { recording } => demo::run(recording, args.seed)?,
+    };
+    report.finish(args.json.as_deref())
 }

@@ -8,20 +8,20 @@ use locoman_robot::model::ModelError;
 #[derive(Debug, thiserror::Error)]
 pub enum SimRobotError {
     /// The scene file cannot be read.
-    #[error("cannot read {path}: {source}; is `--configs` the folder `configs` of this project?")]
+    #[error("cannot read {path}: {reason}; is `--configs` the folder `configs` of this project?")]
     Read {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The scene file is not what it should be.
-    #[error("{path}: {source}")]
+    #[error("{path}: {reason}")]
     Scene {
         /// The file.
         path: PathBuf,
         /// What the parser said, with the line.
-        source: Box<toml::de::Error>,
+        reason: Box<toml::de::Error>,
     },
     /// A value in the scene file makes no sense.
     #[error("{path}: {problem}")]
@@ -47,6 +47,9 @@ pub enum SimRobotError {
     /// MuJoCo refused the scene.
     #[error("MuJoCo: {0}")]
     MuJoCo(String),
+    /// The socket for commands.
+    #[error("the socket for commands: {0}")]
+    Socket(std::io::Error),
     /// The physics blew up.
     #[error("the simulated robot's state is no longer finite after {time_s} s: look at the last commands")]
     Diverged {

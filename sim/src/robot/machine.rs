@@ -164,9 +164,9 @@ impl SimRobot {
         self.push_until_step = self.step + steps.max(1);
     }
 
-    /// Sets the clock: the sensors' time at time zero.
-    pub fn set_epoch_ns(&mut self, epoch_ns: u64) {
-        self.epoch_ns = epoch_ns;
+    /// Sets the sensors' clock, which starts at 0 and advances with the exchanges.
+    pub fn set_time_ns(&mut self, now_ns: u64) {
+        self.epoch_ns = now_ns.saturating_sub(self.time_ns() - self.epoch_ns);
     }
 
     /// The sensors' clock now, ns.

@@ -5,6 +5,7 @@
 //! configs/scenes/robot.toml ───────┴─────────────────────────┴──► noise ──┘        (tests)  (UDP, Zenoh)
 //! ```
 
+pub mod command;
 pub mod drives;
 mod error;
 pub mod jaws;
@@ -12,12 +13,14 @@ pub mod lockstep;
 pub mod machine;
 pub mod mjcf;
 pub mod noise;
+pub mod publish;
 pub mod scene;
+pub mod server;
 pub mod shapes;
+pub mod wire;
 pub mod world;
 
-use std::path::Path;
-
+pub use command::{Args, run};
 pub use error::SimRobotError;
 pub use lockstep::LockstepPlant;
 pub use machine::{Options, SimRobot};
@@ -29,12 +32,3 @@ pub const EXCHANGE_S: f64 = 0.0025;
 pub const EXCHANGE_NS: u64 = 2_500_000;
 /// Longest command latency that a profile may ask for, s.
 pub const MAX_LATENCY_S: f64 = 0.05;
-
-/// Arguments of `locoman-sim robot`.
-#[derive(Debug, clap::Args)]
-pub struct Args {}
-
-/// Runs `locoman-sim robot`.
-pub fn run(_args: &Args, _configs: &Path) -> anyhow::Result<()> {
-    anyhow::bail!("`locoman-sim robot` is not built yet")
-}

@@ -143,9 +143,9 @@ impl Scene {
     pub fn load(configs: &Path) -> Result<Self, SimRobotError> {
         let path = configs.join(SCENE_FILE);
         let text = std::fs::read_to_string(&path)
-            .map_err(|source| SimRobotError::Read { path: path.clone(), source })?;
+            .map_err(|reason| SimRobotError::Read { path: path.clone(), reason })?;
         let scene: Self = toml::from_str(&text)
-            .map_err(|source| SimRobotError::Scene { path: path.clone(), source: Box::new(source) })?;
+            .map_err(|reason| SimRobotError::Scene { path: path.clone(), reason: Box::new(reason) })?;
         scene.check().map_err(|problem| SimRobotError::Value { path, problem })?;
         Ok(scene)
     }
