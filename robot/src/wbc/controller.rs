@@ -7,6 +7,7 @@ use super::{
     ground::{ForceDistribution, GroundReaction, ground_load},
     hierarchy::TaskChain,
     inertia::InertiaFactor,
+    stops::Stops,
     task::Task,
 };
 use crate::{
@@ -14,6 +15,9 @@ use crate::{
     joints::JOINTS,
     model::Model,
 };
+
+/// Most joints of one limb that can be stopped at the ends of their ranges: all of a front one.
+const MAX_STOPS_IN_LIMB: usize = 6;
 
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
@@ -75,7 +79,7 @@ impl WholeBodyController {
             return;
         }
         self.dynamics.update(model, state);
-        let acceleration = self.track(state, objectives, contacts, &mut status);
+        let acceleration = self.track(model, state, objectives, contacts, &mut status);
         let reaction = self.forces.solve(model, &self.dynamics, contacts, &acceleration);
         let Some(reaction) = reaction else {
             status.fault = Some(WbcFault::Output);
@@ -97,9 +101,10 @@ impl WholeBodyController {
     /// q̄, dq̄ and ddq̄ of the last objective; returns ddq̄.
     ///
     /// The contacts come first. They start the chains with q̄_0 = q, dq̄_0 = 0 and ddq̄_0 = J_c‡ (-J̇_c q̇): the
-    /// paper prints -J_c q̇, which has the unit of a velocity.
+    /// paper prints -J_c q̇, which has the unit of a velocity. Then come joints at an end of their range.
     fn track(
         &mut self,
+        model: &Model,
         state: &State,
         objectives: &[Objective],
         contacts: &ContactSet,
@@ -113,6 +118,27 @@ impl WholeBodyController {
             self.add(&task, 0.0);
         }
         let contacts_only = self.acceleration();
+        let start = (self.kinematic.mark(), self.dynamic.mark());
+
+        let mut stops = Stops::default();
+        for _ in 0..=MAX_STOPS_IN_LIMB {
+            self.kinematic.rewind(&start.0);
+            self.dynamic.rewind(&start.1);
+            self.track_with(state, objectives, &stops, status);
+            if !stops.extend(model, state, self.kinematic.solution(0), self.settings.joint_margin) {
+                break;
+            }
+        }
+        status.limited = stops.iter().fold(0, |limited, (joint, _)| limited | 1 << joint);
+        self.bounded(&contacts_only, &self.acceleration(), status)
+    }
+
+    /// Adds stopped joints and objectives to the chains.
+    fn track_with(&mut self, state: &State, objectives: &[Objective], stops: &Stops, status: &mut WbcStatus) {
+        for (joint, end) in stops.iter() {
+            let task = Task::stop(state, joint, end, &self.settings.objectives.arm_posture);
+            self.add(&task, 0.0);
+        }
         for objective in objectives {
             let gains = self.settings.objectives.of(objective.kind());
             let start = gains.damping_start;
@@ -121,7 +147,6 @@ impl WholeBodyController {
                 None => status.fault = Some(WbcFault::Reference),
             }
         }
-        self.bounded(&contacts_only, &self.acceleration(), status)
     }
 
     /// One level of the hierarchy: the paper's three recursions, with J_pre of the exact null space.

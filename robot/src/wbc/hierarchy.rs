@@ -35,6 +35,13 @@ pub(super) struct TaskChain<const N: usize> {
     solutions: [[f64; DOF]; N],
 }
 
+/// A chain as it was after some of its tasks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark<const N: usize> {
+    rank: usize,
+    solutions: [[f64; DOF]; N],
+}
+
 /// J_pre = U Σ Vᵀ of a task of three rows.
 #[derive(Debug, Clone)]
 pub(super) struct Projected {
@@ -67,6 +74,17 @@ impl<const N: usize> TaskChain<N> {
     pub(super) fn clear(&mut self) {
         self.rank = 0;
         self.solutions = [[0.0; DOF]; N];
+    }
+
+    /// To come back to with [`Self::rewind`].
+    pub(super) const fn mark(&self) -> Mark<N> {
+        Mark { rank: self.rank, solutions: self.solutions }
+    }
+
+    /// Forgets the tasks since a mark.
+    pub(super) const fn rewind(&mut self, mark: &Mark<N>) {
+        self.rank = mark.rank;
+        self.solutions = mark.solutions;
     }
 
     pub(super) fn solution(&self, index: usize) -> &[f64; DOF] {

@@ -18,6 +18,7 @@ mod objective;
 mod output;
 mod settings;
 mod status;
+mod stops;
 mod task;
 
 pub use contact::ContactSet;

@@ -81,6 +81,8 @@ pub struct WbcSettings {
     pub objectives: ObjectiveGains,
     /// Contact forces.
     pub contact: ContactForceSettings,
+    /// Joints stop this far before the ends of their ranges, rad.
+    pub joint_margin: f64,
     /// Greatest joint acceleration asked for by the objectives together, rad/s².
     pub max_joint_acceleration: f64,
 }
@@ -142,6 +144,7 @@ impl Default for WbcSettings {
                 slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
                 failures_to_fault: 3,
             },
+            joint_margin: 0.01,
             max_joint_acceleration: 200.0,
         }
     }
@@ -184,6 +187,7 @@ impl WbcSettings {
         let least = contact.min_vertical;
         let checks = [
             ("max_joint_acceleration", positive(self.max_joint_acceleration), "above 0 rad/s2"),
+            ("joint_margin", (0.0..0.2).contains(&self.joint_margin), "at least 0 and below 0.2 rad"),
             ("contact.friction", positive(contact.friction), "above 0"),
             ("contact.min_vertical", least >= 0.0 && least.is_finite(), "at least 0 body weights"),
             ("contact.max_vertical", contact.max_vertical > least, "above contact.min_vertical"),

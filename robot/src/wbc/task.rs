@@ -34,6 +34,22 @@ impl Task {
         }
     }
 
+    /// A joint that stops at an end of its range.
+    pub(super) fn stop(state: &State, joint: usize, end: f64, gains: &Gains) -> Self {
+        let mut rows = [[0.0; DOF]; 3];
+        rows[0][6 + joint] = 1.0;
+        let along = |value: f64| Vector3::new(value, 0.0, 0.0);
+        let motion = [Vector3::zeros(), along(state.velocity[joint])];
+        Self::commanded(
+            rows,
+            along(end - state.position[joint]),
+            motion,
+            Vector3::zeros(),
+            Vector3::zeros(),
+            gains,
+        )
+    }
+
     /// An objective; nothing if its reference holds a number that is not finite.
     pub(super) fn objective(
         objective: &Objective,
