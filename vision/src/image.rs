@@ -4,6 +4,7 @@ use std::fmt;
 
 use opencv::core::{Mat, MatTraitConst, MatTraitConstManual, Vector};
 use opencv::imgcodecs;
+use opencv::prelude::VectorToVec;
 
 /// An 8-bit grey image without padding between its rows.
 #[derive(Clone, PartialEq, Eq)]
@@ -34,6 +35,12 @@ pub enum ImageError {
         /// What the decoder said.
         reason: String,
     },
+    /// The encoder failed.
+    #[error("the image cannot be encoded ({reason})")]
+    Unencodable {
+        /// What the encoder said.
+        reason: String,
+    },
 }
 
 impl GrayImage {
@@ -49,16 +56,55 @@ impl GrayImage {
 
     /// Decodes JPEG, PNG and whatever else OpenCV can read; colour becomes grey.
     pub fn decode(bytes: &[u8]) -> Result<Self, ImageError> {
+        Self::decode_as(bytes, imgcodecs::IMREAD_GRAYSCALE)
+    }
+
+    fn decode_as(bytes: &[u8], how: i32) -> Result<Self, ImageError> {
         let undecodable = |reason: &dyn fmt::Display| ImageError::Undecodable {
             bytes: bytes.len(),
             reason: reason.to_string(),
         };
-        let mat = imgcodecs::imdecode(&Vector::from_slice(bytes), imgcodecs::IMREAD_GRAYSCALE)
-            .map_err(|error| undecodable(&error))?;
+        let mat =
+            imgcodecs::imdecode(&Vector::from_slice(bytes), how).map_err(|error| undecodable(&error))?;
         if mat.empty() {
             return Err(undecodable(&"unknown or damaged format"));
         }
         Self::from_mat(&mat).map_err(|error| undecodable(&error))
+    }
+
+    /// [`GrayImage::decode`] at half the size, which costs a JPEG a third.
+    pub fn decode_half(bytes: &[u8]) -> Result<Self, ImageError> {
+        Self::decode_as(bytes, imgcodecs::IMREAD_REDUCED_GRAYSCALE_2)
+    }
+
+    /// The mean of each two by two pixels.
+    pub fn half(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut data = Vec::with_capacity(width as usize * height as usize);
+        for y in 0..height {
+            let (above, below) = (self.row(2 * y), self.row(2 * y + 1));
+            let pairs = above.chunks_exact(2).zip(below.chunks_exact(2));
+            data.extend(pairs.map(|(a, b)| {
+                let sum: u16 = a.iter().chain(b).map(|&pixel| u16::from(pixel)).sum();
+                u8::try_from((sum + 2) / 4).unwrap_or(u8::MAX)
+            }));
+        }
+        Self { width, height, data }
+    }
+
+    /// Encodes as JPEG; `quality` 0 to 100.
+    pub fn to_jpeg(&self, quality: i32) -> Result<Vec<u8>, ImageError> {
+        let failed = |error: opencv::Error| ImageError::Unencodable { reason: error.message };
+        let mat = Mat::new_rows_cols_with_data(
+            i32::try_from(self.height).unwrap_or(i32::MAX),
+            i32::try_from(self.width).unwrap_or(i32::MAX),
+            &self.data,
+        )
+        .map_err(failed)?;
+        let mut bytes = Vector::<u8>::new();
+        let parameters = Vector::from_slice(&[imgcodecs::IMWRITE_JPEG_QUALITY, quality]);
+        imgcodecs::imencode(".jpg", &mat, &mut bytes, &parameters).map_err(failed)?;
+        Ok(bytes.to_vec())
     }
 
     /// Copies a matrix of one byte a pixel.
@@ -128,6 +174,14 @@ impl Pixels {
             Self::Encoded(bytes) => GrayImage::decode(bytes).map(std::borrow::Cow::Owned),
         }
     }
+
+    /// The grey image at half its size, for previews.
+    pub fn to_gray_half(&self) -> Result<GrayImage, ImageError> {
+        match self {
+            Self::Gray(image) => Ok(image.half()),
+            Self::Encoded(bytes) => GrayImage::decode_half(bytes),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -139,6 +193,17 @@ mod tests {
         assert!(matches!(GrayImage::decode(b""), Err(ImageError::Undecodable { .. })));
         assert!(matches!(GrayImage::decode(b"no image"), Err(ImageError::Undecodable { .. })));
         assert!(matches!(GrayImage::new(3, 2, vec![0; 5]), Err(ImageError::Size { .. })));
+    }
+
+    #[test]
+    fn half_an_image_is_the_mean_of_its_pixels_and_jpeg_keeps_it() {
+        let sut = GrayImage::new(32, 16, (0..512u32).map(|i| (i % 32 * 4) as u8).collect()).expect("size");
+        let half = sut.half();
+        assert_eq!((half.width(), half.height(), &half.row(7)[..3]), (16, 8, &[2u8, 10, 18][..]));
+        let decoded = Pixels::Encoded(sut.to_jpeg(95).expect("encode")).to_gray_half().expect("decode");
+        assert_eq!((decoded.width(), decoded.height()), (16, 8));
+        let worst = half.data().iter().zip(decoded.data()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(4), "{worst:?}");
     }
 
     #[test]
