@@ -1,1 +1,38 @@
-//! teleop
+//! The operator's station: from cameras or a joystick to the robot's command, with recorder and console.
+//!
+//! ```text
+//! replay, cameras ─► feed ─► tracking ─► observe ─┐
+//!                                                 ├─► pilot ─► command_loop ─► Zenoh `command`
+//! gamepad, console (browser) ─────────────────────┘    ▲
+//!                                  robot_view ◄────────┴── Zenoh `state`
+//! ```
+//!
+//! What decides is pure (`observe`, `map`, `stick`, `auto`, `pilot`): time and inputs come from outside.
+//! Threads: cameras (`feed`), tracker (`tracking`), commands (`command_loop`), recorder, gamepad, console;
+//! they meet on the [`board`], where each takes the newest and none waits for another.
+
+pub mod auto;
+pub mod board;
+pub mod command_loop;
+pub mod config;
+pub mod console;
+pub mod doctor;
+pub mod feed;
+pub mod gamepad;
+pub mod ids;
+pub mod latency;
+pub mod latest;
+pub mod map;
+pub mod motion;
+pub mod observe;
+pub mod pilot;
+pub mod poses;
+pub mod record;
+pub mod recorder;
+pub mod replay;
+pub mod robot_view;
+pub mod run;
+pub mod sources;
+pub mod stick;
+pub mod stop;
+pub mod tracking;

@@ -1,0 +1,141 @@
+// The 3D view: robot, its target beside it, the operator's shells at the side.
+import { AmbientLight, AxesHelper, BoxGeometry, Color, DirectionalLight, EdgesGeometry, Fog, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Mesh, MeshStandardMaterial, OrbitControls, PerspectiveCamera, Scene, SphereGeometry, WebGLRenderer } from './vendor/three.min.js';
+import { robotFromUrdf } from './urdf.js';
+
+// Standing, arms stowed along the calves: what is shown before any robot has spoken.
+const STAND = [0, 0.9, -1.8, 0, 0.9, -1.8, 0, 0.9, -1.8, 0, 0.9, -1.8, 0, 0, 0, 0, 0, 0];
+const STAND_HEIGHT_M = 0.285;
+const FOOT_RADIUS_M = 0.02;
+const TARGET = 0xffb454;
+const BACKGROUND = 0x151b24;
+
+function setPose(object, pose) {
+  object.visible = Boolean(pose);
+  if (!pose) return;
+  object.position.set(...pose.p);
+  const [w, x, y, z] = pose.q;
+  object.quaternion.set(x, y, z, w);
+}
+
+function ghostBox(x, y, z) {
+  const box = new BoxGeometry(x, y, z);
+  const group = new Group();
+  group.add(new LineSegments(new EdgesGeometry(box), new LineBasicMaterial({ color: TARGET })));
+  group.add(new Mesh(box, new MeshStandardMaterial({ color: TARGET, transparent: true, opacity: 0.12, depthWrite: false })));
+  return group;
+}
+
+function targetFrame() {
+  const group = new Group();
+  group.add(new AxesHelper(0.09), new Mesh(new SphereGeometry(0.013, 16, 12), new MeshStandardMaterial({ color: TARGET, emissive: 0x553300 })));
+  return group;
+}
+
+/** Shells where the operator stands; drawn at the robot's left, turned to face the same way. */
+function operatorShells(scene) {
+  const place = new Group();
+  place.position.set(0.05, 0.75, 0.1);
+  place.scale.setScalar(0.5); // a person is four times as tall as the robot
+  scene.add(place);
+  const shells = new Map();
+  let home = null;
+  const sizes = { torso: [0.04, 0.3, 0.3], palm: [0.07, 0.07, 0.03], thumb: [0.03, 0.03, 0.02] };
+  return (reports) => {
+    for (const report of reports) {
+      let group = shells.get(report.name);
+      if (!group) {
+        group = new Group();
+        const size = sizes[report.name.split('_').pop()] ?? sizes.thumb;
+        const body = new Mesh(new BoxGeometry(...size), new MeshStandardMaterial({ color: 0x7fd17f, transparent: true, opacity: 0.55 }));
+        group.add(body, new AxesHelper(report.name === 'torso' ? 0.25 : 0.12));
+        group.userData.body = body;
+        shells.set(report.name, group);
+        place.add(group);
+      }
+      const usable = report.verdict !== 'lost' && report.pose;
+      if (usable && report.name === 'torso' && !home) home = report.pose.p;
+      setPose(group, usable ? report.pose : null);
+      if (usable && home) { group.position.x -= home[0]; group.position.y -= home[1]; group.position.z += 0.75 - home[2]; }
+      group.userData.body.material.color.set(report.verdict === 'tracked' ? 0x7fd17f : 0xffb454);
+    }
+  };
+}
+
+export async function makeScene(canvas) {
+  const renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
+  renderer.setPixelRatio(Math.min(window.devicePixelRatio, 1.5));
+  const scene = new Scene();
+  scene.background = new Color(BACKGROUND);
+  scene.fog = new Fog(BACKGROUND, 3, 8);
+  scene.add(new AmbientLight(0xffffff, 0.5), new HemisphereLight(0xcfe3ff, 0x30343c, 1.3));
+  const sun = new DirectionalLight(0xffffff, 1.8);
+  sun.position.set(1.5, -2, 3);
+  scene.add(sun);
+  const ground = new GridHelper(6, 30, 0x3a4656, 0x242d3a);
+  ground.rotation.x = Math.PI / 2;
+  scene.add(ground);
+  const camera = new PerspectiveCamera(42, 1, 0.02, 30);
+  camera.up.set(0, 0, 1);
+  camera.position.set(1.45, -0.95, 0.8);
+  const controls = new OrbitControls(camera, canvas);
+  controls.target.set(0.1, 0.16, 0.22);
+  controls.update();
+
+  // Estimates count from the torso frame at the last reset, which is not the ground: the feet are.
+  const world = new Group();
+  world.position.z = STAND_HEIGHT_M;
+  scene.add(world);
+  const torso = new Group();
+  world.add(torso);
+  const torsoTarget = ghostBox(0.3762, 0.0935, 0.114);
+  const gripperTargets = [targetFrame(), targetFrame()];
+  world.add(torsoTarget, ...gripperTargets);
+  [torsoTarget, ...gripperTargets].forEach((object) => { object.visible = false; });
+  const showShells = operatorShells(scene);
+
+  let robot = null;
+  try {
+    const answer = await fetch('robot.urdf');
+    if (!answer.ok) throw new Error(await answer.text());
+    robot = robotFromUrdf(await answer.text());
+    torso.add(robot.root);
+    robot.setJoints(STAND, [0, 0]);
+  } catch (error) {
+    console.warn('no picture of the robot:', error);
+  }
+
+  let dirty = true;
+  controls.addEventListener('change', () => { dirty = true; });
+  const resize = () => {
+    const { clientWidth: w, clientHeight: h } = canvas.parentElement;
+    renderer.setSize(w, h, false);
+    camera.aspect = w / Math.max(h, 1);
+    camera.updateProjectionMatrix();
+    dirty = true;
+  };
+  new ResizeObserver(resize).observe(canvas.parentElement);
+  resize();
+  const draw = () => {
+    requestAnimationFrame(draw);
+    if (!dirty) return; // software rendering is dear: only what has changed is drawn
+    dirty = false;
+    renderer.render(scene, camera);
+  };
+  draw();
+
+  return {
+    robot(state) {
+      if (!state) return;
+      robot?.setJoints(state.joints, state.openings);
+      setPose(torso, state.torso);
+      torso.visible = true;
+      // Whatever the robot's frame is, its lowest foot stands on the ground.
+      if (robot) world.position.z += 0.2 * (FOOT_RADIUS_M - robot.lowestFoot());
+      setPose(torsoTarget, state.torso_target);
+      setPose(gripperTargets[0], state.gripper_targets[0]);
+      setPose(gripperTargets[1], state.gripper_targets[1]);
+      dirty = true;
+    },
+    operator(shells) { showShells(shells); dirty = true; },
+  };
+}

@@ -1,0 +1,2 @@
+export { AmbientLight, AxesHelper, BoxGeometry, BufferGeometry, CylinderGeometry, Color, DirectionalLight, Fog, GridHelper, Group, HemisphereLight, Line, LineBasicMaterial, LineSegments, EdgesGeometry, Mesh, MeshBasicMaterial, MeshStandardMaterial, Object3D, PerspectiveCamera, PlaneGeometry, Quaternion, Scene, SphereGeometry, Vector3, WebGLRenderer, ShadowMaterial } from 'three';
+export { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';

@@ -1,0 +1,273 @@
+//! `locoman-teleop`: the operator's station.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use locoman_protocol::Endpoints;
+use locoman_protocol::messages::Mode;
+use locoman_teleop::run::{Operator, Options};
+use locoman_teleop::{doctor, poses, record, run, sources};
+use locoman_vision::rig::Rig;
+use locoman_vision::shells::ShellSet;
+use locoman_vision::track::{Tracker, TrackerSettings};
+use tracing_subscriber::EnvFilter;
+
+/// The operator's station: tracks the operator, or reads joystick and keyboard, and commands the robot.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Cli {
+    /// Folder of the configuration
+    #[arg(long, global = true, default_value = "configs", value_name = "DIR")]
+    configs: PathBuf,
+    /// What to log: error, warn, info, debug, trace, or a filter such as `locoman_teleop=debug`
+    #[arg(long, global = true, default_value = "info", value_name = "LEVEL")]
+    log: String,
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Drives the robot, live or from a recording, and serves the console
+    Run(RunArgs),
+    /// Tracks a recording offline into a table of poses; deterministic
+    Track(TrackArgs),
+    /// Records the cameras of the rig
+    Record(RecordArgs),
+    /// Looks at everything that `run` needs, and says what to do about what is missing
+    Doctor(DoctorArgs),
+}
+
+/// Rig and shells.
+#[derive(Debug, Args)]
+struct Files {
+    /// Rig file [default: CONFIGS/rigs/two_zed_pairs.toml]
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+    /// Shells file [default: CONFIGS/shells/standard.toml]
+    #[arg(long, value_name = "FILE")]
+    shells: Option<PathBuf>,
+}
+
+impl Files {
+    fn rig(&self, configs: &Path) -> PathBuf {
+        self.rig.clone().unwrap_or_else(|| configs.join("rigs/two_zed_pairs.toml"))
+    }
+
+    fn shells(&self, configs: &Path) -> PathBuf {
+        self.shells.clone().unwrap_or_else(|| configs.join("shells/standard.toml"))
+    }
+}
+
+/// Who the robot is and where.
+#[derive(Debug, Args)]
+struct Peer {
+    /// Name of the robot
+    #[arg(long, default_value = "locoman", value_name = "NAME")]
+    robot: String,
+    /// Where robot and simulator listen
+    #[arg(long, value_name = "tcp/HOST:PORT",
+        default_values = ["tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448"])]
+    connect: Vec<String>,
+    /// Address of the console
+    #[arg(long, default_value = "127.0.0.1:8080", value_name = "HOST:PORT")]
+    console: String,
+}
+
+#[derive(Debug, Args)]
+#[group(id = "operator", required = true, multiple = false)]
+struct OperatorArgs {
+    /// Replay a recording, over and over: an MCAP file or a folder of images
+    #[arg(long, value_name = "REC")]
+    replay: Option<PathBuf>,
+    /// Track the operator with the cameras of the rig
+    #[arg(long)]
+    cameras: bool,
+    /// Track nobody: joystick and console only
+    #[arg(long)]
+    joystick: bool,
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    operator: OperatorArgs,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    peer: Peer,
+    /// With --replay: bring the robot into this mode and engage without a person
+    #[arg(long, value_name = "MODE", requires = "replay")]
+    auto_engage: Option<AutoMode>,
+    /// Record the session
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// End after this time
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AutoMode {
+    RightGripper,
+    LeftGripper,
+    Stance,
+}
+
+impl From<AutoMode> for Mode {
+    fn from(mode: AutoMode) -> Self {
+        match mode {
+            AutoMode::RightGripper => Self::RightGripper,
+            AutoMode::LeftGripper => Self::LeftGripper,
+            AutoMode::Stance => Self::Stance,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+struct TrackArgs {
+    /// An MCAP file or a folder of images
+    #[arg(value_name = "REC")]
+    recording: PathBuf,
+    #[command(flatten)]
+    files: Files,
+    /// The table of poses
+    #[arg(short, long, value_name = "POSES.csv")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct RecordArgs {
+    #[command(flatten)]
+    files: Files,
+    /// The recording
+    #[arg(short, long, value_name = "REC.mcap")]
+    output: PathBuf,
+    /// End after this time
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+struct DoctorArgs {
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    peer: Peer,
+    /// A recording to look at
+    #[arg(long, value_name = "REC")]
+    replay: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match start_log(&cli.log).and_then(|()| obey(cli)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            #[expect(clippy::print_stderr, reason = "the one report at the edge of the program")]
+            {
+                eprintln!("error: {error:#}");
+            }
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start_log(level: &str) -> Result<()> {
+    // Zenoh tells of every connection attempt; its warnings are for us to report in our words.
+    let filter = EnvFilter::try_new(format!("{level},zenoh=off,zenoh_transport=off"))
+        .with_context(|| format!("--log {level} is no level: use error, warn, info, debug or trace"))?;
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
+    Ok(())
+}
+
+fn obey(cli: Cli) -> Result<()> {
+    let configs = cli.configs;
+    match cli.task {
+        Task::Run(args) => drive(configs, args),
+        Task::Track(args) => {
+            let rig = Rig::load(&args.files.rig(&configs))?;
+            let shells = ShellSet::load(&args.files.shells(&configs))?;
+            sources::check(&args.recording)?;
+            let tracker = Tracker::new(rig, shells, TrackerSettings::default())?;
+            let summary = poses::write(&args.recording, tracker, &args.output)?;
+            tracing::info!(
+                "{} poses of {} instants in {} ({} frames skipped)",
+                summary.poses,
+                summary.instants,
+                args.output.display(),
+                summary.skipped
+            );
+            Ok(())
+        }
+        Task::Record(args) => {
+            let path = args.files.rig(&configs);
+            let rig = Rig::load(&path)?;
+            let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+            let stop = Arc::new(AtomicBool::new(false));
+            let on_signal = Arc::clone(&stop);
+            ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed))?;
+            let frames = record::run(&rig, &text, &args.output, args.seconds, &stop)?;
+            tracing::info!("{frames} frames in {}", args.output.display());
+            Ok(())
+        }
+        Task::Doctor(args) => examine(&configs, &args),
+    }
+}
+
+fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {
+    let OperatorArgs { replay, cameras, .. } = args.operator;
+    let operator = match replay {
+        Some(path) => Operator::Replay(path),
+        None if cameras => Operator::Cameras,
+        None => Operator::Joystick,
+    };
+    let (interrupt, interrupted) = mpsc::channel();
+    ctrlc::set_handler(move || {
+        // An error means that the program is ending already.
+        let _ = interrupt.send(());
+    })?;
+    let options = Options {
+        rig: args.files.rig(&configs),
+        shells: args.files.shells(&configs),
+        configs,
+        operator,
+        robot: args.peer.robot,
+        endpoints: Endpoints { listen: Vec::new(), connect: args.peer.connect },
+        console: args.peer.console,
+        auto_engage: args.auto_engage.map(Into::into),
+        record: args.record,
+        seconds: args.seconds,
+    };
+    run::run(&options, &interrupted)
+}
+
+fn examine(configs: &Path, args: &DoctorArgs) -> Result<()> {
+    let patient = doctor::Patient {
+        configs,
+        rig: &args.files.rig(configs),
+        shells: &args.files.shells(configs),
+        replay: args.replay.as_deref(),
+        console: &args.peer.console,
+        robot: &args.peer.robot,
+        connect: &args.peer.connect,
+    };
+    let mut failures = 0;
+    doctor::examine(&patient, |finding| {
+        failures += usize::from(matches!(finding, doctor::Finding::Bad(_)));
+        println!("{finding}");
+    });
+    if failures > 0 {
+        bail!("{failures} of the above keep `run` from working");
+    }
+    Ok(())
+}
