@@ -3,7 +3,11 @@
 //! A plant runs the joint law `tau = tau_ff + kp (q_des - q) + kd (dq_des - dq)` by itself, at 2 kHz or
 //! more, as the Go1's motor boards do, and keeps the last command until it gets another.
 
+mod sim;
+pub mod wire;
+
 use serde::{Deserialize, Serialize};
+pub use sim::SimPlant;
 
 use crate::joints::{JOINTS, JointVector};
 
@@ -25,6 +29,14 @@ pub struct JointCommand {
 }
 
 impl JointCommand {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        [&self.position, &self.velocity, &self.torque, &self.kp, &self.kd]
+            .into_iter()
+            .all(|vector| vector.iter().all(|x| x.is_finite()))
+            && self.opening.iter().all(|x| x.is_finite())
+    }
+
     /// Soft damping: no position control, velocity driven to zero.
     pub fn damping() -> Self {
         /// N m s/rad: the Go1's own soft damping (facts/hardware.md 1.8: 2 to 4).
@@ -65,6 +77,17 @@ pub struct Sensors {
     pub accelerometer: [f64; 3],
     /// Vertical force of each foot, N.
     pub foot_force: [f64; 4],
+}
+
+impl Sensors {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        let vectors = [&self.position, &self.velocity, &self.torque];
+        let arrays: [&[f64]; 5] =
+            [&self.opening, &self.attitude, &self.gyro, &self.accelerometer, &self.foot_force];
+        vectors.into_iter().all(|vector| vector.iter().all(|x| x.is_finite()))
+            && arrays.into_iter().flatten().all(|x| x.is_finite())
+    }
 }
 
 /// Why a plant could not exchange.
