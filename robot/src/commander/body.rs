@@ -1,0 +1,176 @@
+//! One body (the torso or a gripper) driven by an operator's displacement.
+//!
+//! On engagement the body's own target is its anchor; from then on the target is displacement ∘ anchor:
+//! p = p_anchor + (p_d - p_d0), R = R_d R_d0⁻¹ R_anchor, with d the displacement now and d0 that at the
+//! anchoring (identity, unless the robot changed modes while the operator held on). So anchoring never moves
+//! a target, whatever the pose.
+
+use nalgebra::{Isometry3, Translation3};
+
+use super::{
+    follower::PoseFollower,
+    limits::RateLimits,
+    ramp::{Ramp, SampleClock},
+    reference::PoseReference,
+};
+
+/// A driven body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrivenBody {
+    follower: PoseFollower,
+    /// Where the follower goes; inside the limits.
+    target: Isometry3<f64>,
+    drive: Option<Drive>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Drive {
+    anchor: Isometry3<f64>,
+    first: Isometry3<f64>,
+    ramp: Ramp,
+}
+
+impl DrivenBody {
+    /// Takes over a moving reference, and brings it to rest.
+    pub fn new(reference: PoseReference, omega: f64, limits: RateLimits) -> Self {
+        let follower = PoseFollower::new(reference, omega, limits);
+        Self { target: follower.stopping_pose(), follower, drive: None }
+    }
+
+    /// Where it should be now.
+    pub fn reference(&self) -> &PoseReference {
+        self.follower.reference()
+    }
+
+    /// Where it goes.
+    pub fn target(&self) -> &Isometry3<f64> {
+        &self.target
+    }
+
+    /// Lets go: comes to rest as soon as it can.
+    pub fn release(&mut self) {
+        if self.drive.take().is_some() {
+            self.target = self.follower.stopping_pose();
+        }
+    }
+
+    /// A fresh sample of the displacement, or none if the body is not tracked: it holds.
+    pub fn displace(&mut self, displacement: Option<&Isometry3<f64>>, clock: &SampleClock, now_ns: u64) {
+        let Some(displacement) = displacement else { return };
+        match &mut self.drive {
+            Some(drive) => drive.ramp.append(displacement, clock, now_ns),
+            None => {
+                self.drive = Some(Drive {
+                    anchor: self.follower.stopping_pose(),
+                    first: *displacement,
+                    ramp: Ramp::at(displacement),
+                });
+            }
+        }
+    }
+
+    /// Marks the beginning of an engagement at displacement zero: what is displaced already is to be done.
+    pub fn engage(&mut self) {
+        self.release();
+        self.drive = Some(Drive {
+            anchor: self.target,
+            first: Isometry3::identity(),
+            ramp: Ramp::at(&Isometry3::identity()),
+        });
+    }
+
+    /// One control step. `permitted` takes a wanted target to the nearest one inside the limits.
+    pub fn advance(&mut self, now_ns: u64, dt_s: f64, permitted: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) {
+        if let Some(drive) = &self.drive {
+            let now = drive.ramp.at_time(now_ns);
+            let translation = now.translation.vector - drive.first.translation.vector;
+            let rotation = now.rotation * drive.first.rotation.inverse();
+            let wanted = Isometry3::from_parts(
+                Translation3::from(drive.anchor.translation.vector + translation),
+                rotation * drive.anchor.rotation,
+            );
+            self.target = permitted(&wanted);
+        }
+        self.follower.follow(&self.target, dt_s);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LIMITS: RateLimits = RateLimits {
+        speed_m_s: 0.5,
+        acceleration_m_s2: 2.0,
+        turn_rad_s: 1.5,
+        turn_acceleration_rad_s2: 10.0,
+    };
+    const DT_S: f64 = 0.0025;
+    const DT_NS: u64 = 2_500_000;
+
+    fn pose() -> impl Strategy<Value = Isometry3<f64>> {
+        (prop::array::uniform3(-1.0..1.0f64), prop::array::uniform3(-1.7..1.7f64))
+            .prop_map(|(p, r)| Isometry3::new(p.into(), r.into()))
+    }
+
+    fn close(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        (a.translation.vector - b.translation.vector).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-7
+    }
+
+    proptest! {
+        #[test]
+        fn engaging_does_not_move_the_target_whatever_the_poses(
+            start in pose(), displacement in pose(), fresh: bool,
+        ) {
+            let mut sut = DrivenBody::new(PoseReference::hold(&start), 30.0, LIMITS);
+            let clock = SampleClock::default();
+            // Fresh: the operator engages now. Else: he held on while the robot changed modes.
+            let at = if fresh { sut.engage(); Isometry3::identity() } else { displacement };
+            sut.displace(Some(&at), &clock, 0);
+            for tick in 0..40 {
+                sut.advance(tick * DT_NS, DT_S, |wanted| *wanted);
+                prop_assert!(close(sut.target(), &start));
+                prop_assert!(close(&sut.reference().pose(), &start));
+            }
+        }
+
+        #[test]
+        fn the_target_is_the_displacement_after_the_anchor(start in pose(), displacement in pose()) {
+            let mut sut = DrivenBody::new(PoseReference::hold(&start), 30.0, LIMITS);
+            let clock = SampleClock::default();
+            sut.engage();
+            sut.displace(Some(&displacement), &clock, 0);
+            for tick in 0..40 {
+                sut.advance(tick * DT_NS, DT_S, |wanted| *wanted);
+            }
+            let expected = Isometry3::from_parts(
+                (start.translation.vector + displacement.translation.vector).into(),
+                displacement.rotation * start.rotation,
+            );
+            prop_assert!(close(sut.target(), &expected));
+        }
+
+        #[test]
+        fn releasing_holds(start in pose(), displacement in pose()) {
+            let mut sut = DrivenBody::new(PoseReference::hold(&start), 30.0, LIMITS);
+            let clock = SampleClock::default();
+            sut.engage();
+            sut.displace(Some(&displacement), &clock, 0);
+            for tick in 0..100 {
+                sut.advance(tick * DT_NS, DT_S, |wanted| *wanted);
+            }
+            sut.release();
+            let held = *sut.target();
+            let before = sut.reference().pose();
+            let braking_m = LIMITS.speed_m_s.powi(2) / LIMITS.acceleration_m_s2;
+            prop_assert!((held.translation.vector - before.translation.vector).norm() < braking_m * 1.1);
+            for tick in 100..500 {
+                sut.advance(tick * DT_NS, DT_S, |wanted| *wanted);
+            }
+            prop_assert!(close(sut.target(), &held));
+            prop_assert!((sut.reference().pose().translation.vector - held.translation.vector).norm() < 1e-4);
+        }
+    }
+}

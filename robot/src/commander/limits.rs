@@ -1,0 +1,157 @@
+//! How far and how fast an operator may move the robot: `configs/robot/limits.toml`.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+/// A symmetric or lopsided range.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Lower end.
+    pub min: f64,
+    /// Upper end.
+    pub max: f64,
+}
+
+impl Range {
+    const fn around_zero(half: f64) -> Self {
+        Self { min: -half, max: half }
+    }
+
+    fn clamp(&self, value: f64) -> f64 {
+        value.max(self.min).min(self.max)
+    }
+}
+
+/// Greatest speeds and accelerations of a body's target.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RateLimits {
+    /// m/s.
+    pub speed_m_s: f64,
+    /// m/s².
+    pub acceleration_m_s2: f64,
+    /// rad/s.
+    pub turn_rad_s: f64,
+    /// rad/s².
+    pub turn_acceleration_rad_s2: f64,
+}
+
+/// Range of the torso's target about its pose at the world's reset.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorsoRange {
+    /// m.
+    pub x: Range,
+    /// m.
+    pub y: Range,
+    /// m.
+    pub z: Range,
+    /// rad.
+    pub roll: Range,
+    /// rad.
+    pub pitch: Range,
+    /// rad.
+    pub yaw: Range,
+}
+
+impl TorsoRange {
+    /// The nearest pose inside the range, taken coordinate by coordinate.
+    pub fn clamp(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let p = pose.translation.vector;
+        let p = Vector3::new(self.x.clamp(p.x), self.y.clamp(p.y), self.z.clamp(p.z));
+        let (roll, pitch, yaw) = pose.rotation.euler_angles();
+        let clamped = UnitQuaternion::from_euler_angles(
+            self.roll.clamp(roll),
+            self.pitch.clamp(pitch),
+            self.yaw.clamp(yaw),
+        );
+        Isometry3::from_parts(p.into(), clamped)
+    }
+}
+
+/// Range of a gripper's target about where it was when its mode began; orientation is free.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GripperRange {
+    /// m.
+    pub x: Range,
+    /// m, positive outwards: mirrored for the right gripper.
+    pub outward: Range,
+    /// m.
+    pub z: Range,
+}
+
+impl GripperRange {
+    /// The nearest position inside the box about `start`; `outward` is +1 for the left side, -1 for the right.
+    pub fn clamp(&self, position: &Vector3<f64>, start: &Vector3<f64>, outward: f64) -> Vector3<f64> {
+        let d = position - start;
+        let y = outward * self.outward.clamp(outward * d.y);
+        start + Vector3::new(self.x.clamp(d.x), y, self.z.clamp(d.z))
+    }
+}
+
+/// Everything in `limits.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Torso on four feet.
+    pub stance_torso: TorsoRange,
+    /// Torso while a gripper is used.
+    pub gripper_torso: TorsoRange,
+    /// Gripper.
+    pub gripper: GripperRange,
+    /// How fast the torso's target moves.
+    pub torso_rate: RateLimits,
+    /// How fast a gripper's target moves.
+    pub gripper_rate: RateLimits,
+    /// How fast the jaws' target moves, full strokes per second.
+    pub opening_per_s: f64,
+    /// The centre of mass stays this far inside the feet's polygon, m.
+    pub support_margin_m: f64,
+    /// A foot in the air stays this far above where it would touch the ground, m.
+    pub foot_clearance_m: f64,
+    /// A gripper's origin stays this far above the centres of the standing feet, m.
+    pub gripper_clearance_m: f64,
+    /// Natural frequency of the critically damped follower of the operator's motion, rad/s.
+    pub follower_rad_s: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        let gripper_torso = TorsoRange {
+            x: Range::around_zero(0.06),
+            y: Range::around_zero(0.06),
+            z: Range { min: -0.08, max: 0.06 },
+            roll: Range::around_zero(0.3),
+            pitch: Range::around_zero(0.3),
+            yaw: Range::around_zero(0.4),
+        };
+        Self {
+            stance_torso: TorsoRange { z: Range { min: -0.12, max: 0.07 }, ..gripper_torso },
+            gripper_torso,
+            gripper: GripperRange {
+                x: Range { min: -0.2, max: 0.22 },
+                outward: Range { min: -0.15, max: 0.22 },
+                z: Range { min: -0.15, max: 0.3 },
+            },
+            torso_rate: RateLimits {
+                speed_m_s: 0.3,
+                acceleration_m_s2: 1.5,
+                turn_rad_s: 1.0,
+                turn_acceleration_rad_s2: 5.0,
+            },
+            gripper_rate: RateLimits {
+                speed_m_s: 0.5,
+                acceleration_m_s2: 2.0,
+                turn_rad_s: 1.5,
+                turn_acceleration_rad_s2: 10.0,
+            },
+            opening_per_s: 4.0,
+            support_margin_m: 0.015,
+            foot_clearance_m: 0.015,
+            gripper_clearance_m: 0.03,
+            follower_rad_s: 30.0,
+        }
+    }
+}

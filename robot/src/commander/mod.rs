@@ -1,0 +1,27 @@
+//! From what the operator wants to what each body should do now.
+//!
+//! ```text
+//! Command ──► Engagement ──► DrivenBody: anchor ──► Ramp ──► Limits ──► PoseFollower ──► PoseReference
+//!             who moves it                within range,       within speed       pose, velocity,
+//!                                         over the feet       and acceleration   acceleration
+//! ```
+
+mod body;
+mod command;
+mod engagement;
+mod follower;
+mod limits;
+mod quintic;
+mod ramp;
+mod reference;
+mod support;
+
+pub use body::DrivenBody;
+pub use command::{Command, EngagementId, RequestId};
+pub use engagement::{Engagement, Grip};
+pub use follower::PoseFollower;
+pub use limits::{GripperRange, Limits, Range, RateLimits, TorsoRange};
+pub use quintic::{PointMotion, PoseMotion, RotationMotion};
+pub use ramp::{Ramp, SampleClock};
+pub use reference::{PoseReference, rebased_point};
+pub use support::{from_above, push_inside};

@@ -1,0 +1,67 @@
+//! Kinematics relative to the torso: what the joint angles alone say, before the torso's pose is known.
+//!
+//! [`crate::dynamics`] computes the same in the world, with everything else; the estimator needs this before.
+
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+
+use crate::{
+    joints::{JointVector, Leg},
+    model::{Frame, Model, PARENT},
+};
+
+/// Pose of the body that moves with a joint, in the torso's frame.
+fn torso_from_body(model: &Model, position: &JointVector, joint: usize) -> Isometry3<f64> {
+    let own = &model.joints[joint];
+    let rotation = UnitQuaternion::from_axis_angle(&own.axis, position[joint]);
+    let parent_from_body = own.parent_from_joint * Isometry3::from_parts(Translation3::identity(), rotation);
+    match PARENT[joint] {
+        None => parent_from_body,
+        Some(parent) => torso_from_body(model, position, parent) * parent_from_body,
+    }
+}
+
+/// Pose of a frame in the torso's frame.
+pub fn torso_from_frame(model: &Model, position: &JointVector, frame: Frame) -> Isometry3<f64> {
+    match frame.joint() {
+        None => Isometry3::identity(),
+        Some(joint) => torso_from_body(model, position, joint) * frame.body_from_frame(model),
+    }
+}
+
+/// A foot relative to the torso.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FootKinematics {
+    /// Pose of the foot in the torso's frame.
+    pub torso_from_foot: Isometry3<f64>,
+    /// Velocity of the foot's centre in the torso's frame for each joint's velocity, m/rad.
+    pub linear: Matrix3<f64>,
+    /// Axes of the three joints in the torso's frame: angular velocity of the foot for each joint's.
+    pub angular: Matrix3<f64>,
+}
+
+impl FootKinematics {
+    /// Kinematics of one leg's foot.
+    pub fn new(model: &Model, position: &JointVector, leg: Leg) -> Self {
+        let torso_from_foot = torso_from_frame(model, position, Frame::Foot(leg));
+        let foot = torso_from_foot.translation.vector;
+        let (mut linear, mut angular) = (Matrix3::zeros(), Matrix3::zeros());
+        for column in 0..3 {
+            let joint = leg.first_joint() + column;
+            let body = torso_from_body(model, position, joint);
+            let axis = body.rotation * model.joints[joint].axis.into_inner();
+            linear.set_column(column, &axis.cross(&(foot - body.translation.vector)));
+            angular.set_column(column, &axis);
+        }
+        Self { torso_from_foot, linear, angular }
+    }
+
+    /// Position of the foot's centre in the torso's frame.
+    pub fn position(&self) -> Vector3<f64> {
+        self.torso_from_foot.translation.vector
+    }
+}
+
+/// The three numbers of a leg.
+pub fn of_leg(vector: &JointVector, leg: Leg) -> Vector3<f64> {
+    vector.fixed_rows::<3>(leg.first_joint()).into_owned()
+}
