@@ -1,0 +1,23 @@
+//! Modes, the way between them, and what is moved on that way.
+//!
+//! ```text
+//!            ┌────────────── lie down ◄──────────────┐
+//!            ▼                                       │
+//! damped ─► stand up ─► recentre ───────────────► stance ─► shift torso ─► lift foot ─► single gripper
+//!                          ▲                                     │             │             │
+//!                          ├─────────────────────────────────────┘             ▼             │
+//!                          └────────────────── lower foot ◄────────────────── stow ◄─────────┘
+//! ```
+//! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves.
+
+mod choreography;
+mod machine;
+mod mode;
+mod setpoint;
+mod settings;
+
+pub use choreography::{Choreography, Progress, Scene};
+pub use machine::{Inputs, Machine, Refusal, Request, Start};
+pub use mode::{Mode, Phase};
+pub use setpoint::{ArmGoal, Setpoint};
+pub use settings::{JointGains, MotionSettings, PoseSettings};

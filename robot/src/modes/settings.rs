@@ -1,0 +1,162 @@
+//! Postures, durations and gains of the modes: part of `configs/robot/control.toml`.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use crate::joints::{JointVector, Leg, Side};
+
+/// Named postures.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseSettings {
+    /// Hip, thigh, calf of every leg when standing, rad.
+    pub stand_rad: Vector3<f64>,
+    /// Hip, thigh, calf of every leg when lying, rad: the feet stay below the hips on the way.
+    pub fold_rad: Vector3<f64>,
+    /// The left arm folded up along its calf, rad; the right one has joint 2 mirrored.
+    pub left_stow_rad: Vector3<f64>,
+    /// An arm ready for use, rad.
+    pub ready_rad: Vector3<f64>,
+    /// Torso's origin above the feet's centres in stance, m.
+    pub stand_height_m: f64,
+    /// Shift of the torso before the right foot lifts (y mirrored for the left), m.
+    pub right_shift_m: Vector3<f64>,
+    /// How far a foot is lifted for its gripper, m.
+    pub lift_m: f64,
+    /// Height from which a foot is lowered, m.
+    pub hover_m: f64,
+}
+
+impl Default for PoseSettings {
+    fn default() -> Self {
+        Self {
+            stand_rad: Vector3::new(0.0, 0.9, -1.8),
+            fold_rad: Vector3::new(0.0, 1.39, -2.78),
+            left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
+            ready_rad: Vector3::new(-std::f64::consts::FRAC_PI_8, 0.0, 0.0),
+            stand_height_m: 0.265,
+            right_shift_m: Vector3::new(-0.05, 0.03, 0.02),
+            lift_m: 0.12,
+            hover_m: 0.05,
+        }
+    }
+}
+
+impl PoseSettings {
+    /// The folded posture of an arm.
+    pub fn stow(&self, side: Side) -> Vector3<f64> {
+        let [x, y, z] = self.left_stow_rad.into();
+        match side {
+            Side::Left => Vector3::new(x, y, z),
+            Side::Right => Vector3::new(x, -y, z),
+        }
+    }
+
+    /// Shift of the torso before a foot lifts.
+    pub fn shift(&self, side: Side) -> Vector3<f64> {
+        let [x, y, z] = self.right_shift_m.into();
+        match side {
+            Side::Right => Vector3::new(x, y, z),
+            Side::Left => Vector3::new(x, -y, z),
+        }
+    }
+
+    /// All joints: the same for each leg, arms folded.
+    pub fn posture(&self, leg_rad: &Vector3<f64>) -> JointVector {
+        let mut posture = JointVector::zeros();
+        for leg in Leg::ALL {
+            posture.fixed_rows_mut::<3>(leg.first_joint()).copy_from(leg_rad);
+        }
+        for side in Side::ALL {
+            posture.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from(&self.stow(side));
+        }
+        posture
+    }
+}
+
+/// Durations and speeds of scripted motions.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionSettings {
+    /// From anywhere to the fold, s.
+    pub fold_s: f64,
+    /// From the fold to the stand, s.
+    pub stand_s: f64,
+    /// Rest at the end of standing up, s.
+    pub settle_s: f64,
+    /// Least duration of a torso's motion, s.
+    pub torso_s: f64,
+    /// Greatest mean speed of a scripted torso motion, m/s.
+    pub torso_m_s: f64,
+    /// Greatest mean angular speed of a scripted torso motion, rad/s.
+    pub torso_rad_s: f64,
+    /// Time in which a foot is unloaded or loaded, s.
+    pub load_s: f64,
+    /// Duration of lifting, s.
+    pub lift_s: f64,
+    /// Duration of folding and unfolding an arm, s.
+    pub arm_s: f64,
+    /// Speed of a foot towards the ground, m/s.
+    pub lower_m_s: f64,
+    /// Vertical force that tells that a foot has landed, N.
+    pub touch_n: f64,
+    /// How far below the expected ground a foot may search, m.
+    pub search_m: f64,
+    /// From standing to the fold when lying down, s.
+    pub lie_down_s: f64,
+    /// Least distance of the centre of mass to the edge of three feet before a foot lifts, m.
+    pub lift_margin_m: f64,
+}
+
+impl Default for MotionSettings {
+    fn default() -> Self {
+        Self {
+            fold_s: 1.2,
+            stand_s: 1.8,
+            settle_s: 0.3,
+            torso_s: 1.0,
+            torso_m_s: 0.1,
+            torso_rad_s: 0.3,
+            load_s: 0.4,
+            lift_s: 1.0,
+            arm_s: 2.0,
+            lower_m_s: 0.05,
+            touch_n: 8.0,
+            search_m: 0.04,
+            lie_down_s: 2.5,
+            lift_margin_m: 0.02,
+        }
+    }
+}
+
+/// Joint-level gains.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointGains {
+    /// Legs under the whole-body controller, N m/rad.
+    pub balance_kp: f64,
+    /// N m s/rad.
+    pub balance_kd: f64,
+    /// Legs that follow plain joint set-points, N m/rad.
+    pub scripted_kp: f64,
+    /// N m s/rad.
+    pub scripted_kd: f64,
+}
+
+impl Default for JointGains {
+    fn default() -> Self {
+        Self { balance_kp: 60.0, balance_kd: 2.0, scripted_kp: 200.0, scripted_kd: 2.0 }
+    }
+}
+
+impl JointGains {
+    /// kp and kd of all joints. Those of the arms are 0: their servos follow positions with their own gains.
+    pub fn vectors(leg_kp: f64, leg_kd: f64) -> (JointVector, JointVector) {
+        let (mut kp, mut kd) = (JointVector::zeros(), JointVector::zeros());
+        for leg in Leg::ALL {
+            kp.fixed_rows_mut::<3>(leg.first_joint()).fill(leg_kp);
+            kd.fixed_rows_mut::<3>(leg.first_joint()).fill(leg_kd);
+        }
+        (kp, kd)
+    }
+}

@@ -1,0 +1,231 @@
+//! Watches everything that can go wrong, and says what must happen: a pure function of time and flags.
+//!
+//! Requirements `R-SAFE-…` stand in `SAFETY.md`; each names its test here or in the controller.
+
+mod severity;
+mod thresholds;
+
+pub use severity::{Reason, Reasons, Severity};
+pub use thresholds::Thresholds;
+
+/// A stop that somebody asked for. Latched by the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Stop {
+    /// None.
+    #[default]
+    None,
+    /// Settle on four feet, lie down, damp.
+    Settle,
+    /// Damp at once.
+    Damp,
+}
+
+/// What the sensors are worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorHealth {
+    /// A sample of now.
+    Good,
+    /// A sample with numbers that are none.
+    NotFinite,
+    /// None for this long.
+    Silent {
+        /// ns.
+        for_ns: u64,
+    },
+}
+
+/// What the supervisor looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flags {
+    /// Now, on the robot's clock.
+    pub now_ns: u64,
+    /// When the last valid command arrived.
+    pub command_ns: Option<u64>,
+    /// A foot is in the air, or about to be.
+    pub manipulating: bool,
+    /// State of the sensors.
+    pub sensors: SensorHealth,
+    /// Angle between the torso's z axis and up, rad.
+    pub tilt_rad: f64,
+    /// The stop that is latched.
+    pub stop: Stop,
+    /// A foot that stands by plan has carried nothing for this long, ns.
+    pub unloaded_ns: u64,
+    /// The whole-body controller reported a fault.
+    pub control_fault: bool,
+}
+
+/// What must happen, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Assessment {
+    /// The worst of the causes.
+    pub severity: Severity,
+    /// All causes.
+    pub reasons: Reasons,
+}
+
+impl Assessment {
+    fn raise(&mut self, severity: Severity, reason: Reason) {
+        self.severity = self.severity.max(severity);
+        self.reasons.insert(reason);
+    }
+}
+
+/// Judges the situation.
+pub fn assess(thresholds: &Thresholds, flags: &Flags) -> Assessment {
+    let mut verdict = Assessment::default();
+    judge_operator(thresholds, flags, &mut verdict);
+    judge_robot(thresholds, flags, &mut verdict);
+    match flags.stop {
+        Stop::None => {}
+        Stop::Settle => verdict.raise(Severity::LieDown, Reason::StopSettle),
+        Stop::Damp => verdict.raise(Severity::Damp, Reason::StopDamp),
+    }
+    verdict
+}
+
+fn judge_operator(thresholds: &Thresholds, flags: &Flags, verdict: &mut Assessment) {
+    let Some(command_ns) = flags.command_ns else {
+        verdict.raise(Severity::Hold, Reason::NoOperator);
+        return;
+    };
+    let age_ms = ms(flags.now_ns.saturating_sub(command_ns));
+    if age_ms >= thresholds.command_hold_ms {
+        verdict.raise(Severity::Hold, Reason::CommandLate);
+    }
+    if age_ms >= thresholds.command_disengage_ms {
+        verdict.raise(Severity::Disengage, Reason::CommandLost);
+    }
+    if flags.manipulating && age_ms >= thresholds.command_stand_ms {
+        verdict.raise(Severity::Stand, Reason::OperatorGone);
+    }
+}
+
+fn judge_robot(thresholds: &Thresholds, flags: &Flags, verdict: &mut Assessment) {
+    match flags.sensors {
+        SensorHealth::Good => {}
+        SensorHealth::NotFinite => verdict.raise(Severity::Damp, Reason::SensorsNotFinite),
+        SensorHealth::Silent { for_ns } => {
+            if ms(for_ns) >= thresholds.sensors_late_ms {
+                verdict.raise(Severity::Warn, Reason::SensorsLate);
+            }
+            if ms(for_ns) >= thresholds.sensors_lost_ms {
+                verdict.raise(Severity::Disengage, Reason::SensorsLost);
+            }
+        }
+    }
+    if flags.tilt_rad >= thresholds.tilt_damp_rad || flags.tilt_rad.is_nan() {
+        verdict.raise(Severity::Damp, Reason::Fallen);
+    } else if flags.tilt_rad >= thresholds.tilt_hold_rad {
+        verdict.raise(Severity::Stand, Reason::Tilted);
+    }
+    if ms(flags.unloaded_ns) >= thresholds.foot_unloaded_ms {
+        verdict.raise(Severity::Warn, Reason::FootUnloaded);
+    }
+    if flags.control_fault {
+        verdict.raise(Severity::Disengage, Reason::Control);
+    }
+}
+
+fn ms(ns: u64) -> f64 {
+    ns as f64 * 1e-6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// A robot that is well, with a command of just now.
+    fn well() -> Flags {
+        Flags {
+            now_ns: 10_000 * MS,
+            command_ns: Some(10_000 * MS),
+            manipulating: true,
+            sensors: SensorHealth::Good,
+            tilt_rad: 0.02,
+            stop: Stop::None,
+            unloaded_ns: 0,
+            control_fault: false,
+        }
+    }
+
+    fn silent_for(ms: u64) -> Flags {
+        Flags { command_ns: Some((10_000 - ms) * MS), ..well() }
+    }
+
+    fn severity(flags: &Flags) -> Severity {
+        assess(&Thresholds::default(), flags).severity
+    }
+
+    #[test]
+    fn a_robot_that_is_well_is_left_alone() {
+        assert_eq!(assess(&Thresholds::default(), &well()), Assessment::default());
+    }
+
+    #[test]
+    fn r_safe_001_targets_freeze_100_ms_after_the_last_command() {
+        assert_eq!(severity(&silent_for(99)), Severity::None);
+        assert_eq!(severity(&silent_for(100)), Severity::Hold);
+    }
+
+    #[test]
+    fn r_safe_002_the_engagement_ends_500_ms_after_the_last_command() {
+        assert_eq!(severity(&silent_for(499)), Severity::Hold);
+        assert_eq!(severity(&silent_for(500)), Severity::Disengage);
+    }
+
+    #[test]
+    fn r_safe_003_a_robot_on_three_feet_goes_back_to_four_5_s_after_the_last_command() {
+        assert_eq!(severity(&silent_for(4_999)), Severity::Disengage);
+        assert_eq!(severity(&silent_for(5_000)), Severity::Stand);
+        let on_four_feet = Flags { manipulating: false, ..silent_for(5_000) };
+        assert_eq!(severity(&on_four_feet), Severity::Disengage);
+    }
+
+    #[test]
+    fn r_safe_004_a_leaning_robot_goes_back_to_four_feet_and_a_falling_one_is_damped() {
+        let leaning = |tilt_rad| Flags { tilt_rad, ..well() };
+        assert_eq!(severity(&leaning(0.49)), Severity::None);
+        assert_eq!(severity(&leaning(0.5)), Severity::Stand);
+        assert_eq!(severity(&leaning(0.9)), Severity::Damp);
+        assert_eq!(severity(&leaning(f64::NAN)), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_005_silent_sensors_are_told_after_50_ms_and_end_the_engagement_after_500_ms() {
+        let silent = |for_ms: u64| Flags { sensors: SensorHealth::Silent { for_ns: for_ms * MS }, ..well() };
+        assert_eq!(severity(&silent(49)), Severity::None);
+        assert_eq!(severity(&silent(50)), Severity::Warn);
+        assert_eq!(severity(&silent(500)), Severity::Disengage);
+    }
+
+    #[test]
+    fn r_safe_006_sensors_that_are_no_numbers_damp_at_once() {
+        assert_eq!(severity(&Flags { sensors: SensorHealth::NotFinite, ..well() }), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_007_a_stop_outranks_everything_below_it() {
+        assert_eq!(severity(&Flags { stop: Stop::Settle, ..silent_for(6_000) }), Severity::LieDown);
+        assert_eq!(severity(&Flags { stop: Stop::Damp, ..well() }), Severity::Damp);
+    }
+
+    #[test]
+    fn without_any_command_nothing_moves_and_the_reason_is_told() {
+        let verdict = assess(&Thresholds::default(), &Flags { command_ns: None, ..well() });
+        assert_eq!(verdict.severity, Severity::Hold);
+        assert!(verdict.reasons.contains(Reason::NoOperator));
+    }
+
+    #[test]
+    fn all_reasons_at_once_are_all_told() {
+        let verdict = assess(
+            &Thresholds::default(),
+            &Flags { stop: Stop::Settle, tilt_rad: 0.6, unloaded_ns: 1_000 * MS, ..silent_for(200) },
+        );
+        let told: Vec<_> = verdict.reasons.iter().collect();
+        assert_eq!(told, [Reason::CommandLate, Reason::Tilted, Reason::StopSettle, Reason::FootUnloaded]);
+    }
+}

@@ -1,0 +1,111 @@
+//! What the supervisor asks for, and why.
+
+/// What must happen, the worst last. The order is that of the message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum Severity {
+    /// All is well.
+    #[default]
+    None,
+    /// Worth telling.
+    Warn,
+    /// Targets frozen; motion needs a fresh command.
+    Hold,
+    /// Engagement ended; motion needs a deliberate new one.
+    Disengage,
+    /// Return to standing on four feet.
+    Stand,
+    /// Settle on four feet, lie down, damp.
+    LieDown,
+    /// Damp at once.
+    Damp,
+}
+
+/// A cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Reason {
+    /// No operator has spoken yet.
+    NoOperator,
+    /// Commands are late.
+    CommandLate,
+    /// Commands have ceased.
+    CommandLost,
+    /// Commands have been gone so long that the robot goes back to four feet.
+    OperatorGone,
+    /// A sensor sample is late.
+    SensorsLate,
+    /// The robot says nothing.
+    SensorsLost,
+    /// Sensors hold numbers that are none.
+    SensorsNotFinite,
+    /// The torso leans further than it should.
+    Tilted,
+    /// The torso leans so far that nothing can be done.
+    Fallen,
+    /// Someone asked to settle.
+    StopSettle,
+    /// Someone asked to damp.
+    StopDamp,
+    /// A foot that should stand carries nothing.
+    FootUnloaded,
+    /// The whole-body controller gave up.
+    Control,
+}
+
+impl Reason {
+    /// All of them, in order.
+    pub const ALL: [Self; 13] = [
+        Self::NoOperator,
+        Self::CommandLate,
+        Self::CommandLost,
+        Self::OperatorGone,
+        Self::SensorsLate,
+        Self::SensorsLost,
+        Self::SensorsNotFinite,
+        Self::Tilted,
+        Self::Fallen,
+        Self::StopSettle,
+        Self::StopDamp,
+        Self::FootUnloaded,
+        Self::Control,
+    ];
+
+    /// For people.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::NoOperator => "no operator yet",
+            Self::CommandLate => "commands are late",
+            Self::CommandLost => "commands have ceased: engage anew",
+            Self::OperatorGone => "the operator is gone: going back to four feet",
+            Self::SensorsLate => "the robot's state is late",
+            Self::SensorsLost => "no state from the robot",
+            Self::SensorsNotFinite => "the robot's state holds numbers that are none",
+            Self::Tilted => "the torso leans too far",
+            Self::Fallen => "the robot has fallen",
+            Self::StopSettle => "stopped: settle, lie down, damp",
+            Self::StopDamp => "stopped: damped",
+            Self::FootUnloaded => "a foot that should stand carries nothing",
+            Self::Control => "the whole-body controller found no forces",
+        }
+    }
+}
+
+/// A set of causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Reasons(u32);
+
+impl Reasons {
+    /// Adds one.
+    pub fn insert(&mut self, reason: Reason) {
+        self.0 |= 1 << reason as u32;
+    }
+
+    /// Whether it is one of them.
+    pub fn contains(self, reason: Reason) -> bool {
+        self.0 & (1 << reason as u32) != 0
+    }
+
+    /// All of them, in order.
+    pub fn iter(self) -> impl Iterator<Item = Reason> {
+        Reason::ALL.into_iter().filter(move |reason| self.contains(*reason))
+    }
+}
