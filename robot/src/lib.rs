@@ -1,7 +1,20 @@
 //! The robot's side.
+//!
+//! ```text
+//! plant ─► estimator ─► supervisor ─► modes ─► commander ─► wbc ─► plant        (control: one step of it)
+//!                            ▲          ▲          ▲      model, dynamics
+//! link ──────────────────────┴──────────┴──────────┘
+//! ```
 
+pub mod commander;
+pub mod control;
 pub mod dynamics;
+pub mod estimator;
 pub mod joints;
+pub mod kinematics;
+pub mod link;
 pub mod model;
+pub mod modes;
 pub mod plant;
+pub mod supervisor;
 pub mod wbc;

@@ -1,0 +1,22 @@
+//! The control loop, without its I/O.
+//!
+//! ```text
+//! Sensors ──► estimator ──► supervisor ──► machine ──► choreography ──► WBC ──► JointCommand
+//! Command ────────────────────▲──────────────▲──────────────▲              └──► Snapshot
+//! ```
+//! [`Controller`] is the same in the real loop, in lockstep tests and in replay: it has no clock, takes no
+//! lock, does no I/O and allocates nothing.
+
+mod controller;
+mod posture;
+mod requests;
+mod run;
+mod settings;
+mod snapshot;
+mod timing;
+
+pub use controller::{Controller, Inputs, Options};
+pub use run::{Wish, run};
+pub use settings::{ConfigError, ControlSettings, RobotConfig};
+pub use snapshot::{BodyState, CommandTrace, Snapshot};
+pub use timing::{Percentiles, SecondHistogram};
