@@ -5,6 +5,7 @@
 pub mod demo;
 pub mod report;
 pub mod statistics;
+pub mod vision;
 
 use std::path::{Path, PathBuf};
 
@@ -38,9 +39,10 @@ pub enum Experiment {
 }
 
 /// Runs `locoman-sim eval`.
-pub fn run(args: &Args, _configs: &Path) -> anyhow::Result<()> {
+pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
+    let plot = args.json.as_ref().map(|json| json.with_extension("svg"));
     let report = match &args.experiment {
-        Experiment::Vision => anyhow::bail!("`locoman-sim eval vision` is not built yet"),
+        Experiment::Vision => vision::run(configs, args.seed, plot.as_deref())?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
     };
     report.finish(args.json.as_deref())

@@ -1,8 +1,13 @@
-//! Means and percentiles of samples.
+//! Means, root mean squares and percentiles of samples.
 
 /// Mean; not a number for no samples.
 pub fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
+}
+
+/// Root of the mean of the squares; not a number for no samples.
+pub fn rms(samples: &[f64]) -> f64 {
+    mean(&samples.iter().map(|sample| sample * sample).collect::<Vec<_>>()).sqrt()
 }
 
 /// The sample below which this share of all lies (nearest rank); not a number for no samples.
