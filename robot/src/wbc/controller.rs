@@ -1,14 +1,11 @@
 //! The control step: hierarchy, forces, torques.
 
-use nalgebra::Matrix3;
-
 use super::{
     ContactSet, Objective, WbcFault, WbcOutput, WbcSettings, WbcStatus,
     ground::{ForceDistribution, GroundReaction, ground_load},
-    hierarchy::TaskChain,
-    inertia::InertiaFactor,
-    stops::Stops,
+    stops::{MOST_IN_A_LIMB, Stops, Surroundings},
     task::Task,
+    tracking::Tracking,
 };
 use crate::{
     dynamics::{DOF, Dynamics, Motion, State},
@@ -16,18 +13,11 @@ use crate::{
     model::Model,
 };
 
-/// Most joints of one limb that can be stopped at the ends of their ranges: all of a front one.
-const MAX_STOPS_IN_LIMB: usize = 6;
-
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
     settings: WbcSettings,
     dynamics: Dynamics,
-    factor: InertiaFactor,
-    /// q̄ - q and dq̄, in the metric of the joints.
-    kinematic: TaskChain<2>,
-    /// L ddq̄, in the metric of the mass matrix.
-    dynamic: TaskChain<1>,
+    tracking: Tracking,
     forces: ForceDistribution,
     failures: u64,
     failures_in_a_row: u32,
@@ -39,9 +29,7 @@ impl WholeBodyController {
         Self {
             settings,
             dynamics: Dynamics::new(),
-            factor: InertiaFactor::new(),
-            kinematic: TaskChain::new(),
-            dynamic: TaskChain::new(),
+            tracking: Tracking::new(),
             forces: ForceDistribution::new(settings.contact),
             failures: 0,
             failures_in_a_row: 0,
@@ -101,7 +89,7 @@ impl WholeBodyController {
     /// q̄, dq̄ and ddq̄ of the last objective; returns ddq̄.
     ///
     /// The contacts come first. They start the chains with q̄_0 = q, dq̄_0 = 0 and ddq̄_0 = J_c‡ (-J̇_c q̇): the
-    /// paper prints -J_c q̇, which has the unit of a velocity. Then come joints at an end of their range.
+    /// paper prints -J_c q̇, which has the unit of a velocity. Then comes what has to stop.
     fn track(
         &mut self,
         model: &Model,
@@ -110,71 +98,45 @@ impl WholeBodyController {
         contacts: &ContactSet,
         status: &mut WbcStatus,
     ) -> Motion {
-        self.factor.factor(self.dynamics.mass_matrix());
-        self.kinematic.clear();
-        self.dynamic.clear();
+        self.tracking.begin(self.dynamics.mass_matrix());
         for leg in contacts.legs() {
-            let task = Task::contact(&self.dynamics, leg);
-            self.add(&task, 0.0);
+            self.tracking.add(&Task::contact(&self.dynamics, leg), 0.0);
         }
-        let contacts_only = self.acceleration();
-        let start = (self.kinematic.mark(), self.dynamic.mark());
+        let contacts_only = self.tracking.acceleration();
+        let start = self.tracking.mark();
 
         let mut stops = Stops::default();
-        for _ in 0..=MAX_STOPS_IN_LIMB {
-            self.kinematic.rewind(&start.0);
-            self.dynamic.rewind(&start.1);
+        for _ in 0..=MOST_IN_A_LIMB {
+            self.tracking.rewind(&start);
             self.track_with(state, objectives, &stops, status);
-            if !stops.extend(model, state, self.kinematic.solution(0), self.settings.joint_margin) {
+            let around = Surroundings {
+                model,
+                state,
+                dynamics: &self.dynamics,
+                contacts,
+                objectives,
+                settings: &self.settings,
+            };
+            if !stops.extend(&around, &self.tracking.position_step()) {
                 break;
             }
         }
-        status.limited = stops.iter().fold(0, |limited, (joint, _)| limited | 1 << joint);
-        self.bounded(&contacts_only, &self.acceleration(), status)
+        status.limited = stops.joints();
+        status.grounded = stops.frames();
+        self.bounded(&contacts_only, &self.tracking.acceleration(), status)
     }
 
-    /// Adds stopped joints and objectives to the chains.
+    /// Stops, then objectives.
     fn track_with(&mut self, state: &State, objectives: &[Objective], stops: &Stops, status: &mut WbcStatus) {
-        for (joint, end) in stops.iter() {
-            let task = Task::stop(state, joint, end, &self.settings.objectives.arm_posture);
-            self.add(&task, 0.0);
-        }
+        let gains = &self.settings.objectives;
+        stops.for_each_task(state, &self.dynamics, &gains.arm_posture, |task| self.tracking.add(&task, 0.0));
         for objective in objectives {
-            let gains = self.settings.objectives.of(objective.kind());
-            let start = gains.damping_start;
+            let gains = gains.of(objective.kind());
             match Task::objective(objective, &self.dynamics, state, gains) {
-                Some(task) => self.add(&task, start),
+                Some(task) => self.tracking.add(&task, gains.damping_start),
                 None => status.fault = Some(WbcFault::Reference),
             }
         }
-    }
-
-    /// One level of the hierarchy: the paper's three recursions, with J_pre of the exact null space.
-    ///
-    /// ```text
-    /// q̄_i   = q̄_{i-1}   + J_pre†  D (x̄ - x - J (q̄_{i-1} - q))
-    /// dq̄_i  = dq̄_{i-1}  + J_pre†  D (dx̄ - J dq̄_{i-1})
-    /// ddq̄_i = ddq̄_{i-1} + J_pre‡  D (ẍ_cmd - J̇ q̇ - J ddq̄_{i-1})
-    /// ```
-    /// D fades a direction out as it becomes singular. It comes from the kinematic chain and serves both:
-    /// J_pre loses rank in the same configurations in either metric.
-    fn add(&mut self, task: &Task, damping_start: f64) {
-        let projected = self.kinematic.project(&task.rows);
-        let damping =
-            if damping_start > 0.0 { projected.damping(damping_start) } else { Matrix3::identity() };
-        self.kinematic.track(&task.rows, &projected, &damping, &[task.error, task.velocity]);
-
-        let mut weighed = task.rows;
-        for row in &mut weighed {
-            self.factor.weigh(row);
-        }
-        let projected = self.dynamic.project(&weighed);
-        self.dynamic.track(&weighed, &projected, &damping, &[task.acceleration]);
-    }
-
-    /// ddq̄ = L⁻¹ y
-    fn acceleration(&self) -> Motion {
-        Motion::from(self.factor.unweigh(self.dynamic.solution(0)))
     }
 
     /// The objectives' acceleration, scaled back towards that of the contacts alone until all joints are
@@ -218,9 +180,10 @@ impl WholeBodyController {
         let effort =
             self.dynamics.inverse_dynamics(&commanded) - ground_load(&self.dynamics, &reaction.force);
         let mut output = WbcOutput::hold(state.position);
+        let (step, velocity) = (self.tracking.position_step(), self.tracking.velocity());
         for joint in 0..JOINTS {
-            output.position[joint] += self.kinematic.solution(0)[6 + joint];
-            output.velocity[joint] = self.kinematic.solution(1)[6 + joint];
+            output.position[joint] += step[6 + joint];
+            output.velocity[joint] = velocity[6 + joint];
             output.torque[joint] = effort[6 + joint];
         }
         output.foot_force = reaction.force;

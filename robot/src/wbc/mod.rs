@@ -20,6 +20,7 @@ mod settings;
 mod status;
 mod stops;
 mod task;
+mod tracking;
 
 pub use contact::ContactSet;
 pub use controller::WholeBodyController;

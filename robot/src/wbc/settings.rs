@@ -83,6 +83,10 @@ pub struct WbcSettings {
     pub contact: ContactForceSettings,
     /// Joints stop this far before the ends of their ranges, rad.
     pub joint_margin: f64,
+    /// A lifted foot stays so far above the height of the standing feet, m.
+    pub foot_clearance: f64,
+    /// The gripper of a lifted foot stays so far above the height of the standing feet, m.
+    pub gripper_clearance: f64,
     /// Greatest joint acceleration asked for by the objectives together, rad/s².
     pub max_joint_acceleration: f64,
 }
@@ -145,6 +149,8 @@ impl Default for WbcSettings {
                 failures_to_fault: 3,
             },
             joint_margin: 0.01,
+            foot_clearance: 0.01,
+            gripper_clearance: 0.01,
             max_joint_acceleration: 200.0,
         }
     }
@@ -188,6 +194,8 @@ impl WbcSettings {
         let checks = [
             ("max_joint_acceleration", positive(self.max_joint_acceleration), "above 0 rad/s2"),
             ("joint_margin", (0.0..0.2).contains(&self.joint_margin), "at least 0 and below 0.2 rad"),
+            ("foot_clearance", (0.0..0.1).contains(&self.foot_clearance), "at least 0 and below 0.1 m"),
+            ("gripper_clearance", (0.0..0.1).contains(&self.gripper_clearance), "at least 0 and below 0.1 m"),
             ("contact.friction", positive(contact.friction), "above 0"),
             ("contact.min_vertical", least >= 0.0 && least.is_finite(), "at least 0 body weights"),
             ("contact.max_vertical", contact.max_vertical > least, "above contact.min_vertical"),

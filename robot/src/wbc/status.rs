@@ -49,8 +49,11 @@ pub struct WbcStatus {
     pub force_failures: u64,
     /// Share of the objectives' accelerations that was kept to stay below the joints' limits; 1 normally.
     pub acceleration_scale: f64,
-    /// Joints whose desired position, velocity or torque was cut to its limit, a bit for each.
+    /// Joints that are stopped at an end of their range, or whose desired position, velocity or torque was
+    /// cut to its limit, a bit for each.
     pub limited: u32,
+    /// Frames that are kept above the ground, a bit for each in the order of `Frame::ALL`.
+    pub grounded: u32,
     /// Set when the output should not be trusted to balance the robot.
     pub fault: Option<WbcFault>,
 }
@@ -62,6 +65,7 @@ impl Default for WbcStatus {
             force_failures: 0,
             acceleration_scale: 1.0,
             limited: 0,
+            grounded: 0,
             fault: None,
         }
     }

@@ -36,18 +36,23 @@ impl Task {
 
     /// A joint that stops at an end of its range.
     pub(super) fn stop(state: &State, joint: usize, end: f64, gains: &Gains) -> Self {
-        let mut rows = [[0.0; DOF]; 3];
-        rows[0][6 + joint] = 1.0;
+        let mut row = [0.0; DOF];
+        row[6 + joint] = 1.0;
+        Self::single(row, end - state.position[joint], state.velocity[joint], 0.0, gains)
+    }
+
+    /// A frame that stops at a height.
+    pub(super) fn floor(frame: &FrameMotion, height: f64, gains: &Gains) -> Self {
+        let error = height - frame.world_from_frame.translation.z;
+        Self::single(height_row(frame), error, frame.velocity.z, frame.bias_acceleration.z, gains)
+    }
+
+    /// One row that comes to rest; the other two are empty.
+    fn single(row: [f64; DOF], error: f64, velocity: f64, bias: f64, gains: &Gains) -> Self {
         let along = |value: f64| Vector3::new(value, 0.0, 0.0);
-        let motion = [Vector3::zeros(), along(state.velocity[joint])];
-        Self::commanded(
-            rows,
-            along(end - state.position[joint]),
-            motion,
-            Vector3::zeros(),
-            Vector3::zeros(),
-            gains,
-        )
+        let rows = [row, [0.0; DOF], [0.0; DOF]];
+        let motion = [Vector3::zeros(), along(velocity)];
+        Self::commanded(rows, along(error), motion, Vector3::zeros(), along(bias), gains)
     }
 
     /// An objective; nothing if its reference holds a number that is not finite.
@@ -143,6 +148,11 @@ impl Task {
 /// Three rows of a frame's Jacobian: from 0 linear, from 3 angular.
 fn rows(frame: &FrameMotion, first: usize) -> Rows {
     std::array::from_fn(|row| std::array::from_fn(|column| frame.jacobian[(first + row, column)]))
+}
+
+/// The row of a frame's Jacobian that gives its vertical velocity.
+pub(super) fn height_row(frame: &FrameMotion) -> [f64; DOF] {
+    std::array::from_fn(|column| frame.jacobian[(2, column)])
 }
 
 fn linear(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
