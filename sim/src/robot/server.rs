@@ -12,6 +12,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use locoman_protocol::clock::monotonic_ns;
+use locoman_protocol::realtime;
 use locoman_robot::plant::JointCommand;
 use triple_buffer::Input;
 
@@ -63,6 +64,7 @@ pub fn serve(
 
 /// Stamps commands at their arrival.
 fn receive(socket: &UdpSocket, sender: &mpsc::Sender<Arrival>, counters: &Counters, stop: &AtomicBool) {
+    realtime::run_before_others();
     let mut buffer = [0; MAX_DATAGRAM];
     while !stop.load(Ordering::Relaxed) {
         match socket.recv_from(&mut buffer) {
@@ -94,6 +96,11 @@ fn simulate(
 ) -> Result<(), SimRobotError> {
     let mut buffer = [0; MAX_DATAGRAM];
     let mut commander = None;
+    if !realtime::run_before_others() {
+        tracing::info!(
+            "no real-time priority (it takes root or an rtprio limit); a busy machine will be felt"
+        );
+    }
     let mut begin_ns = monotonic_ns();
     robot.set_time_ns(begin_ns);
     while !stop.load(Ordering::Relaxed) {
