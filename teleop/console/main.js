@@ -69,9 +69,14 @@ const bar = (share) => mark('bar', `width: ${Math.min(100, 100 * share)}%`);
 const swatch = (color) => mark('swatch', `background: ${color}`);
 const ms = (value) => (value === null || value === undefined ? '–' : `${value.toFixed(value < 10 ? 2 : 1)}`);
 
-let tables = 0;
+let [tables, first] = [0, true];
 function show(status) {
   const { robot, pilot, tracking } = status;
+  // With live cameras and no autopilot the dead-man is there for the tracked operator.
+  if (first && tracking.shells.length) {
+    first = false;
+    if (pilot.auto === null) input.set('drive', 'tracker');
+  }
   scene.robot(robot);
   scene.operator(tracking.shells);
   if (tracking.fresh) addCurves(tracking.shells);

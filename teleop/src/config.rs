@@ -105,7 +105,7 @@ pub struct Opening {
 
 impl Default for Opening {
     fn default() -> Self {
-        Self { closed_rad: 0.2, open_rad: 0.9, max_rate_per_s: 3.0 }
+        Self { closed_rad: 0.1, open_rad: 0.8, max_rate_per_s: 3.0 }
     }
 }
 
@@ -303,7 +303,7 @@ mod tests {
             let error = Config::parse(text, Path::new("teleop.toml")).unwrap_err();
             assert!(matches!(error, ConfigError::Range { .. }), "{error}");
         }
-        let same = Config::parse("[opening]\nclosed_rad = 0.9", Path::new("teleop.toml")).unwrap_err();
+        let same = Config::parse("[opening]\nclosed_rad = 0.8", Path::new("teleop.toml")).unwrap_err();
         assert!(matches!(same, ConfigError::Opening { .. }), "{same}");
     }
 }

@@ -46,7 +46,7 @@ pub struct Inputs {
 /// Something worth recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
-    /// A word for the kind: `engaged`, `disengaged`, `mode`, `auto`.
+    /// A word for the kind: `engaged`, `disengaged`, `mode`, `auto`, `stop`.
     pub name: &'static str,
     /// Why, for people.
     pub detail: String,

@@ -82,7 +82,9 @@ fn partial_path(output: &Path) -> PathBuf {
 /// One row; `None` unless the pose was measured at this instant.
 fn row(time_ns: u64, shell: &str, seen: &ShellUpdate) -> Option<[String; 14]> {
     let pose = seen.world_from_shell.filter(|_| seen.verdict == Verdict::Tracked)?;
-    let (p, q) = (pose.translation.vector, pose.rotation.quaternion());
+    let p = pose.translation.vector;
+    // Of the two quaternions of a rotation the one with a positive w: files compare.
+    let q = pose.rotation.quaternion() * if pose.rotation.w < 0.0 { -1.0 } else { 1.0 };
     let sigma = |first: usize| {
         let mean = (first..first + 3).map(|i| seen.covariance[(i, i)]).sum::<f64>() / 3.0;
         mean.max(0.0).sqrt()

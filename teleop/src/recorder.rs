@@ -71,7 +71,11 @@ impl Recorder {
         let (queue, items) = sync_channel(QUEUE);
         let tap = Tap { queue: Some(queue), dropped: Arc::default() };
         let dropped = Arc::clone(&tap.dropped);
-        let thread = std::thread::spawn(move || write_all(writer, &items, &dropped));
+        let thread = std::thread::spawn(move || {
+            write_all(writer, &items, &dropped)
+                // Now, not only at the end: a session may be worth nothing without its recording.
+                .inspect_err(|error| tracing::error!("the session is no longer recorded: {error}"))
+        });
         Ok((Self { thread }, tap))
     }
 

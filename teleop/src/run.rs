@@ -91,7 +91,7 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     let link = Link::open(&options.robot, &options.endpoints)?;
     let board = Arc::new(Board::default());
     let subscriptions = listen(&link, &board, &tap)?;
-    let stop = Arc::new(StopButton::new(link.sender()?));
+    let stop = Arc::new(StopButton::new(link.sender()?, Arc::clone(&board)));
     let (rig, eyes) = match sight {
         Some((tracker, source)) => {
             let rig = tracker.rig().clone();
@@ -134,6 +134,7 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     if dropped > 0 {
         tracing::warn!("the recorder dropped {dropped} messages");
     }
+    summarize(&board);
     let recorded = recorder.map_or(Ok(()), Recorder::finish);
     outcome?;
     ended?;
@@ -222,13 +223,27 @@ fn wait(options: &Options, interrupted: &mpsc::Receiver<()>, eyes: Option<&Eyes>
     }
 }
 
+/// What the session was like, in a few lines.
+fn summarize(board: &Board) {
+    for camera in lock(&board.tracking).iter().flat_map(|tracking| &tracking.cameras) {
+        tracing::info!("camera {}: {} of {} frames dropped", camera.camera, camera.dropped, camera.frames);
+    }
+    let latency = lock(&board.latency);
+    for stage in Stage::ALL {
+        if let Some((p50, p99)) = latency.percentiles_ns(stage) {
+            let (p50, p99) = (p50 as f64 * 1e-6, p99 as f64 * 1e-6);
+            tracing::info!("{}: p50 {p50:.2} ms, p99 {p99:.2} ms over the last seconds", stage.name());
+        }
+    }
+}
+
 /// The configuration that a session recording carries.
 fn attachments(options: &Options) -> Result<Vec<(String, String)>> {
-    let files: [(&str, &Path); 3] = [
-        ("teleop.toml", &options.configs.join("teleop.toml")),
-        ("rig.toml", &options.rig),
-        ("shells.toml", &options.shells),
-    ];
+    let settings = options.configs.join("teleop.toml");
+    let mut files: Vec<(&str, &Path)> = vec![("teleop.toml", &settings)];
+    if !matches!(options.operator, Operator::Joystick) {
+        files.extend([("rig.toml", options.rig.as_path()), ("shells.toml", options.shells.as_path())]);
+    }
     let read = |(name, path): (&str, &Path)| {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         Ok((name.to_owned(), text))

@@ -19,6 +19,12 @@ pub fn check(path: &Path) -> anyhow::Result<()> {
     if path.is_dir() {
         return Ok(());
     }
+    anyhow::ensure!(
+        path.exists(),
+        "there is no recording `{}`; `locoman-teleop record` makes one from cameras, `locoman-sim operator` \
+         without",
+        path.display()
+    );
     let overview = Overview::read(path)?;
     anyhow::ensure!(
         overview.complete,

@@ -1,12 +1,14 @@
 //! The stop button: any device may press it, on any thread, and the robot latches it.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Stop, stop::Level};
 use locoman_protocol::{LinkError, Sender};
 
+use crate::board::Board;
 use crate::latest::lock;
+use crate::pilot::Note;
 
 /// A second press within this time damps at once.
 const SECOND_PRESS_NS: u64 = 10_000_000_000;
@@ -16,12 +18,13 @@ const SECOND_PRESS_NS: u64 = 10_000_000_000;
 pub struct StopButton {
     sender: Mutex<Sender<Stop>>,
     pressed_ns: Mutex<Option<u64>>,
+    board: Arc<Board>,
 }
 
 impl StopButton {
     /// Over this sender.
-    pub fn new(sender: Sender<Stop>) -> Self {
-        Self { sender: Mutex::new(sender), pressed_ns: Mutex::new(None) }
+    pub fn new(sender: Sender<Stop>, board: Arc<Board>) -> Self {
+        Self { sender: Mutex::new(sender), pressed_ns: Mutex::new(None), board }
     }
 
     /// First press: settle. Second press: damp. Gives back what was sent.
@@ -34,12 +37,13 @@ impl StopButton {
         level
     }
 
-    /// Stops at this level.
+    /// Stops at this level, and switches the autopilot off.
     pub fn send(&self, level: Level) {
+        *lock(&self.board.auto) = Some(false);
         let stop = Stop { level: level.into(), ..Stop::default() };
         let sent: Result<_, LinkError> = lock(&self.sender).send(0, stop);
         match sent {
-            Ok(_) => tracing::warn!("stop sent: {}", level.as_str_name()),
+            Ok(_) => self.board.happened(Note { name: "stop", detail: level.as_str_name().to_owned() }),
             Err(error) => tracing::error!("the stop could not be sent: {error}"),
         }
     }

@@ -75,10 +75,7 @@ fn obey(connection: &Connection<'_>, text: &str) {
         }
         Ok(Request::Mode(mode)) => *lock(&board.mode) = Some(mode.into()),
         Ok(Request::Auto(on)) => *lock(&board.auto) = Some(on),
-        Ok(Request::Stop(level)) => {
-            *lock(&board.auto) = Some(false);
-            connection.console.stop.send(level.into());
-        }
+        Ok(Request::Stop(level)) => connection.console.stop.send(level.into()),
         Err(error) => tracing::warn!("the browser sent what is no request: {error}"),
     }
 }
