@@ -13,8 +13,8 @@ use clarabel::{
 use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES};
 
 /// Of the duality gap. A gap ε leaves the forces uncertain by √(2ε / Q_1), for they are nearly free where
-/// only Q_1 weighs them: at 1e-12, 0.06 N at worst and far less in practice (at the usual 1e-8, newtons).
-const GAP_TOLERANCE: f64 = 1e-12;
+/// only Q_1 weighs them: at 1e-13, 0.02 N at worst and far less in practice (at the usual 1e-8, newtons).
+const GAP_TOLERANCE: f64 = 1e-13;
 /// Of the constraints, in body weights.
 const FEASIBILITY: f64 = 1e-8;
 /// A dozen is the rule.
