@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::Context;
 use clap::{Parser, Subcommand, ValueEnum};
-use locoman_protocol::Endpoints;
+use locoman_protocol::{Endpoints, realtime};
 use locoman_robot::{
     control::{Controller, Options, RobotConfig, Wish, run},
     link::RobotLink,
@@ -58,7 +58,7 @@ struct RunArgs {
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
     /// The robot's name on the network.
-    #[arg(long, value_name = "NAME", default_value = "go1")]
+    #[arg(long, value_name = "NAME", default_value = "locoman")]
     name: String,
     /// Stand up at once, without being asked. Default: true for the simulated robot, false for a real one.
     #[arg(long, value_name = "BOOL")]
@@ -111,6 +111,9 @@ fn control(config: RobotConfig, args: &RunArgs) -> anyhow::Result<()> {
     let options = Options { auto_stand: args.auto_stand.unwrap_or(stand_by_default) };
     let mut controller = Controller::new(config, options);
     let interrupts = count_interrupts()?;
+    if !realtime::run_before_others() {
+        tracing::info!("no real-time priority (it takes root or an rtprio limit); a busy machine will be felt");
+    }
     tracing::info!(listen = ?args.listen, sim = %args.sim, "control loop runs; Ctrl-C lies down and ends");
     run(plant.as_mut(), &mut controller, &mut inbox, &mut outbox, || {
         match interrupts.load(Ordering::Relaxed) {
