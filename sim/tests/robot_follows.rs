@@ -59,24 +59,3 @@ fn the_gripper_and_the_torso_follow_the_operator() {
         }
     }
 }
-
-#[test]
-fn every_mode_is_reached_and_left_again_without_a_fall() {
-    for seed in 1..=4 {
-        let mut sut = drive("hw", seed);
-        let modes = [Mode::Stance, Mode::RightGripper, Mode::LeftGripper, Mode::Stance, Mode::LeftGripper, Mode::Stance];
-        for mode in modes {
-            let motion = |t: f64| Motion { torso: Some(torso(t)), palms: [Some(hand(t)); 2], openings: [Some(1.0); 2] };
-            let outcome = sut.run(&Script { mode, seconds: 2.0, motion });
-            println!("seed {seed} {mode:?} at {:.1} s: {outcome:?}", sut.plant_mut().truth().sim_time_s);
-            outcome.unwrap();
-        }
-        let figures = report(sut.session(), seed);
-        println!("{}", figures.to_string().lines().take(16).collect::<Vec<_>>().join("\n"));
-        assert_eq!(figures.value("falls"), Some(0.0));
-        assert!(figures.value("gripper.position.mean").unwrap() < 5.0);
-        sut.run(&Script { mode: Mode::LieDown, seconds: 1.0, motion: |_| Motion::default() }).unwrap();
-        let height = sut.plant_mut().truth().world_from_torso.translation.z;
-        assert!(height < 0.12, "{height} m");
-    }
-}

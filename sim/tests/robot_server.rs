@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use locoman_protocol::clock::monotonic_ns;
+use locoman_robot::plant::wire::{self, MAX_DATAGRAM};
 use locoman_robot::plant::{JointCommand, Sensors};
 use locoman_sim::robot::server::{Counters, serve};
-use locoman_sim::robot::wire::{self, MAX_DATAGRAM};
 use locoman_sim::robot::{EXCHANGE_NS, Options, SimRobot, Truth};
 use triple_buffer::triple_buffer;
 
@@ -49,7 +49,7 @@ fn send(client: &UdpSocket, command: &JointCommand) {
 fn receive(client: &UdpSocket) -> Sensors {
     let mut buffer = [0; MAX_DATAGRAM];
     let length = client.recv(&mut buffer).unwrap();
-    wire::decode_sensors(&buffer[..length]).unwrap()
+    wire::decode(&buffer[..length]).unwrap()
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! To add one: a module with `run`, and a variant of [`Experiment`].
 
 pub mod demo;
+pub mod drive;
 pub mod report;
 pub mod statistics;
 pub mod vision;

@@ -116,7 +116,7 @@ impl SimRobot {
     /// A command that arrives `after_ns` of the present exchange; a nonsensical one is dropped, as a drive
     /// drops a damaged frame.
     pub fn send(&mut self, command: &JointCommand, after_ns: u64) {
-        if !is_finite(command) {
+        if !command.is_finite() {
             self.rejected_commands += 1;
             return;
         }
@@ -229,15 +229,6 @@ impl SimRobot {
             foot_force: self.noise.foot_force(self.world.foot_force()),
         }
     }
-}
-
-fn is_finite(command: &JointCommand) -> bool {
-    let JointCommand { position, velocity, torque, kp, kd, opening } = command;
-    [position, velocity, torque, kp, kd]
-        .into_iter()
-        .flat_map(|part| part.iter())
-        .chain(opening)
-        .all(|x| x.is_finite())
 }
 
 /// Holds a posture by joint position alone.

@@ -17,7 +17,6 @@ pub mod publish;
 pub mod scene;
 pub mod server;
 pub mod shapes;
-pub mod wire;
 pub mod world;
 
 pub use command::{Args, run};

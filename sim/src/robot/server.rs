@@ -14,10 +14,10 @@ use std::time::Duration;
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::realtime;
 use locoman_robot::plant::JointCommand;
+use locoman_robot::plant::wire::{self, MAX_DATAGRAM};
 use triple_buffer::Input;
 
 use super::machine::SimRobot;
-use super::wire::{self, MAX_DATAGRAM};
 use super::world::Truth;
 use super::{EXCHANGE_NS, SimRobotError};
 
@@ -68,14 +68,14 @@ fn receive(socket: &UdpSocket, sender: &mpsc::Sender<Arrival>, counters: &Counte
     let mut buffer = [0; MAX_DATAGRAM];
     while !stop.load(Ordering::Relaxed) {
         match socket.recv_from(&mut buffer) {
-            Ok((length, from)) => match wire::decode_command(&buffer[..length]) {
-                Some(command) => {
+            Ok((length, from)) => match wire::decode(&buffer[..length]) {
+                Ok(command) => {
                     let arrival = Arrival { command, from, received_ns: monotonic_ns() };
                     if sender.send(arrival).is_err() {
                         return;
                     }
                 }
-                None => {
+                Err(_) => {
                     counters.malformed.fetch_add(1, Ordering::Relaxed);
                 }
             },
@@ -112,7 +112,7 @@ fn simulate(
         }
         let sensors = robot.advance()?;
         if let Some(address) = commander
-            && let Some(datagram) = wire::encode(&sensors, &mut buffer)
+            && let Ok(datagram) = wire::encode(&sensors, &mut buffer)
         {
             // A robot that has gone away is no reason to stop: it may return.
             let _ = socket.send_to(datagram, address);
