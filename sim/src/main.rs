@@ -53,7 +53,15 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
+/// The error and its causes; a cause that its effect has quoted already is not said twice.
 #[expect(clippy::print_stderr, reason = "the one report at the edge of the program")]
 fn report(error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    let mut said = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !said.contains(&cause) {
+            said += if said.is_empty() { "" } else { ": " };
+            said += &cause;
+        }
+    }
+    eprintln!("error: {said}");
 }

@@ -128,7 +128,7 @@ fn a_recording_holds_all_images_and_the_truth_and_is_the_same_each_time() {
     let formats = Formats { jpeg: true, png: false };
     let write = |name: &str| -> PathBuf {
         let path = folder.join(name);
-        let recording = create_recording(&path, &inputs()).expect("recording");
+        let recording = create_recording(&path, &inputs(), &sut).expect("recording");
         let mut outputs: Vec<Box<dyn Output>> = vec![Box::new(recording)];
         render_to(&sut, schedule, formats, &mut outputs).expect("rendering");
         assert!(!path.exists(), "unfinished, it has no name yet");
@@ -136,19 +136,35 @@ fn a_recording_holds_all_images_and_the_truth_and_is_the_same_each_time() {
         path
     };
     let first = write("a.mcap");
-    let (mut images, mut truths) = (0, 0);
+    let (mut images, mut truths, mut calibrations) = (0, 0, 0);
     for message in Reader::open(&first).expect("open") {
         let message = message.expect("whole");
         if camera_of_image_topic(message.topic()).is_some() {
             images += 1;
-        } else {
+        } else if message.is::<Tracking>() {
             let truth: Tracking = message.decode().expect("truth");
             assert_eq!(truth.shells.len(), 5);
             truths += 1;
+        } else {
+            assert!(message.topic().ends_with("/calibration"), "{}", message.topic());
+            calibrations += 1;
         }
     }
-    assert_eq!((images, truths), (3 * cameras, 3));
+    assert_eq!((images, truths, calibrations), (3 * cameras, 3, cameras));
     let second = write("b.mcap");
     assert!(std::fs::read(&first).expect("a") == std::fs::read(&second).expect("b"));
     std::fs::remove_dir_all(&folder).expect("clean up");
+}
+
+#[test]
+fn a_scene_with_a_typo_is_refused_by_file_line_and_key() {
+    let good = std::fs::read_to_string(inputs().scene).expect("the committed scene");
+    let path = std::env::temp_dir().join(format!("locoman-scene-{}.toml", std::process::id()));
+    std::fs::write(&path, good.replacen("exposure_s", "exposure_ms", 1)).expect("write");
+    let error = Scene::read(&path).expect_err("an unknown key");
+    let said = format!("{:#}", anyhow::Error::from(error));
+    let line = 1 + good.lines().position(|line| line.starts_with("exposure_s")).expect("the key");
+    assert!(said.contains("exposure_ms") && said.contains(&format!("line {line}")), "{said}");
+    assert!(said.contains(&path.display().to_string()), "{said}");
+    std::fs::remove_file(&path).expect("clean up");
 }

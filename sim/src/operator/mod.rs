@@ -153,7 +153,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
 
     let mut outputs: Vec<Box<dyn Output>> = Vec::new();
     if let Some(path) = &args.output {
-        outputs.push(Box::new(create_recording(path, &inputs)?));
+        outputs.push(Box::new(create_recording(path, &inputs, &studio)?));
     }
     if let Some(path) = &args.folder {
         outputs.push(Box::new(Folder::create(path, studio.cameras().map(|camera| camera.id.as_str()))?));
@@ -175,11 +175,13 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
 }
 
 /// Begins a recording that carries the files it was made from.
-pub fn create_recording(path: &Path, inputs: &Inputs) -> anyhow::Result<Recording> {
+pub fn create_recording(path: &Path, inputs: &Inputs, studio: &Studio) -> anyhow::Result<Recording> {
     let read =
         |path: &Path| fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
     let (rig, shells, scene) = (read(&inputs.rig)?, read(&inputs.shells)?, read(&inputs.scene)?);
-    Recording::create(path, &[("rig.toml", &rig), ("shells.toml", &shells), ("scene.toml", &scene)])
+    let attachments =
+        [("rig.toml", rig.as_str()), ("shells.toml", shells.as_str()), ("scene.toml", scene.as_str())];
+    Recording::create(path, &attachments, studio.cameras())
 }
 
 /// Which encodings the outputs need.

@@ -10,7 +10,7 @@ use super::motion::{Axis, Body, Motion};
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("cannot read the scene file {path}: {source}")]
+    #[error("cannot read the scene file {path}")]
     Read {
         /// The file.
         path: PathBuf,
@@ -18,7 +18,7 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// A key or a value is wrong; the text shows the line.
-    #[error("{path}: {source}")]
+    #[error("{path} cannot be used as a scene")]
     Parse {
         /// The file.
         path: PathBuf,

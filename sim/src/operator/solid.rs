@@ -24,7 +24,7 @@ pub enum SolidError {
     #[error("shell `{0}` is none of torso, right_palm, left_palm, right_thumb, left_thumb")]
     Name(String),
     /// A tag of it cannot be printed.
-    #[error("shell `{shell}`: {source}")]
+    #[error("shell `{shell}` cannot be printed")]
     Ink {
         /// The shell.
         shell: String,
@@ -230,6 +230,7 @@ mod tests {
     #[test]
     fn a_foreign_family_is_refused_by_name() {
         let set = ShellSet { family: "tag25h9".into(), ..cube() };
-        assert!(solids(&set).unwrap_err().to_string().contains("tag25h9"));
+        let error = format!("{:#}", anyhow::Error::from(solids(&set).unwrap_err()));
+        assert!(error.contains("tag25h9"), "{error}");
     }
 }

@@ -3,8 +3,12 @@
 use std::path::Path;
 
 use anyhow::Context;
+use locoman_protocol::messages::foxglove::CameraCalibration;
 use locoman_protocol::messages::{Header, Pose, ShellPose, Tracking, Verdict};
 use locoman_protocol::recording::{self, Writer};
+use locoman_vision::camera::{Camera, Distortion};
+
+use crate::operator::FIRST_CAPTURE_NS;
 
 use super::{Instant, Output, Unfinished};
 
@@ -17,11 +21,19 @@ pub struct Recording {
 
 impl Recording {
     /// Begins a recording; `attachments` are the names and texts of the files that it was made from.
-    pub fn create(path: &Path, attachments: &[(&str, &str)]) -> anyhow::Result<Self> {
+    pub fn create<'a>(
+        path: &Path,
+        attachments: &[(&str, &str)],
+        cameras: impl Iterator<Item = &'a Camera>,
+    ) -> anyhow::Result<Self> {
         let unfinished = Unfinished::new(path)?;
         let mut writer = Writer::create(&unfinished.temporary)?;
         for (name, text) in attachments {
             writer.attach(name, "application/toml", text.as_bytes())?;
+        }
+        for camera in cameras {
+            let topic = recording::calibration_topic(&camera.id);
+            writer.write(&topic, FIRST_CAPTURE_NS, &calibration(camera))?;
         }
         Ok(Self { writer, unfinished })
     }
@@ -43,6 +55,29 @@ impl Output for Recording {
         let Self { writer, unfinished } = *self;
         writer.finish()?;
         unfinished.keep()
+    }
+}
+
+/// Intrinsics in the order of Foxglove's schema, which is OpenCV's.
+fn calibration(camera: &Camera) -> CameraCalibration {
+    let ((fx, fy), (cx, cy)) =
+        ((camera.focal_px.x, camera.focal_px.y), (camera.center_px.x, camera.center_px.y));
+    let (distortion_model, d) = match &camera.distortion {
+        Distortion::Pinhole => ("plumb_bob", vec![0.0; 5]),
+        Distortion::RadTan(k) if k[5..] == [0.0; 3] => ("plumb_bob", k[..5].to_vec()),
+        Distortion::RadTan(k) => ("rational_polynomial", k.to_vec()),
+        Distortion::Fisheye(k) => ("kannala_brandt", k.to_vec()),
+    };
+    CameraCalibration {
+        timestamp: Some(recording::timestamp(FIRST_CAPTURE_NS)),
+        frame_id: camera.id.clone(),
+        width: camera.width,
+        height: camera.height,
+        distortion_model: distortion_model.to_owned(),
+        d,
+        k: vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: vec![fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
     }
 }
 
