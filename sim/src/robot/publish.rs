@@ -12,6 +12,8 @@ use super::world::Truth;
 
 const PERIOD: Duration = Duration::from_millis(10);
 const REPORT_PERIOD: Duration = Duration::from_secs(5);
+/// Fewer late exchanges in a report's period (of 2000) are not worth a line.
+const LATE_WORTH_TELLING: u64 = 20;
 
 /// Publishes the newest truth until `stop`, and logs what went wrong in the real-time loop.
 pub fn publish(
@@ -75,7 +77,7 @@ impl Report {
         let late = counters.late_exchanges.load(Ordering::Relaxed);
         let lost_ns = counters.lost_ns.load(Ordering::Relaxed);
         let malformed = counters.malformed.load(Ordering::Relaxed);
-        if late > self.late || lost_ns > self.lost_ns {
+        if late > self.late + LATE_WORTH_TELLING || lost_ns > self.lost_ns {
             tracing::warn!(
                 late_exchanges = late - self.late,
                 lost_ms = (lost_ns - self.lost_ns) / 1_000_000,
