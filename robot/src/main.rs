@@ -29,7 +29,7 @@ struct Cli {
     #[arg(long, global = true, value_name = "DIR", default_value = "configs")]
     configs: PathBuf,
     /// What to log to stderr: error, warn, info, debug, or a filter such as `info,locoman_robot=debug`.
-    #[arg(long, global = true, value_name = "LEVEL", default_value = "info")]
+    #[arg(long, global = true, value_name = "LEVEL", default_value = "info,zenoh=warn")]
     log: String,
     #[command(subcommand)]
     command: Command,

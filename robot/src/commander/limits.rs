@@ -101,8 +101,10 @@ pub struct Limits {
     pub gripper_torso: TorsoRange,
     /// Gripper.
     pub gripper: GripperRange,
-    /// How fast the torso's target moves.
-    pub torso_rate: RateLimits,
+    /// How fast the torso's target moves on four feet.
+    pub stance_torso_rate: RateLimits,
+    /// How fast the torso's target moves while a gripper is used.
+    pub gripper_torso_rate: RateLimits,
     /// How fast a gripper's target moves.
     pub gripper_rate: RateLimits,
     /// How fast the jaws' target moves, full strokes per second.
@@ -135,11 +137,17 @@ impl Default for Limits {
                 outward: Range { min: -0.15, max: 0.22 },
                 z: Range { min: -0.15, max: 0.3 },
             },
-            torso_rate: RateLimits {
+            stance_torso_rate: RateLimits {
                 speed_m_s: 0.3,
                 acceleration_m_s2: 1.5,
                 turn_rad_s: 1.0,
                 turn_acceleration_rad_s2: 5.0,
+            },
+            gripper_torso_rate: RateLimits {
+                speed_m_s: 0.15,
+                acceleration_m_s2: 0.5,
+                turn_rad_s: 0.6,
+                turn_acceleration_rad_s2: 2.0,
             },
             gripper_rate: RateLimits {
                 speed_m_s: 0.5,
@@ -148,10 +156,10 @@ impl Default for Limits {
                 turn_acceleration_rad_s2: 10.0,
             },
             opening_per_s: 4.0,
-            support_margin_m: 0.015,
+            support_margin_m: 0.02,
             foot_clearance_m: 0.015,
             gripper_clearance_m: 0.03,
-            follower_rad_s: 30.0,
+            follower_rad_s: 40.0,
         }
     }
 }

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     commander::{
-        Command, DrivenBody, Grip, Limits, PointMotion, PoseMotion, PoseReference, SampleClock, from_above,
-        push_inside,
+        Command, DrivenBody, Grip, Limits, PointMotion, PoseMotion, PoseReference, RateLimits, SampleClock,
+        from_above, push_inside,
     },
     dynamics::State,
     estimator::heading,
@@ -136,7 +136,7 @@ impl Choreography {
             torso_motion: PoseMotion::new(&still, &identity, 1.0),
             arm_motions: Side::ALL.map(|side| PointMotion::hold(poses.stow(side))),
             foot_motion: PointMotion::hold(Vector3::zeros()),
-            torso: DrivenBody::new(still, limits.follower_rad_s, limits.torso_rate),
+            torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
             gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
             gripper_start: Vector3::zeros(),
             opening: [0.0; 2],
@@ -221,7 +221,7 @@ impl Choreography {
                     self.move_arm(side, &self.poses.stow(side), self.motions.arm_s);
                 }
             }
-            Phase::Stance => self.drive_torso(),
+            Phase::Stance => self.drive_torso(self.limits.stance_torso_rate),
             Phase::ShiftTorso(side) => {
                 self.move_torso(&Isometry3::from_parts(
                     self.poses.shift(side).into(),
@@ -238,7 +238,7 @@ impl Choreography {
                 self.move_arm(side, &ready, self.motions.arm_s);
             }
             Phase::SingleGripper(side) => {
-                self.drive_torso();
+                self.drive_torso(self.limits.gripper_torso_rate);
                 self.drive_gripper(side, scene);
             }
             Phase::Stow(side) => {
@@ -467,8 +467,8 @@ impl Choreography {
         push_inside(&from_above(&scene.com), &feet, self.motions.lift_margin_m) == Vector2::zeros()
     }
 
-    fn drive_torso(&mut self) {
-        self.torso = DrivenBody::new(self.setpoint.torso, self.limits.follower_rad_s, self.limits.torso_rate);
+    fn drive_torso(&mut self, rate: RateLimits) {
+        self.torso = DrivenBody::new(self.setpoint.torso, self.limits.follower_rad_s, rate);
     }
 
     fn drive_gripper(&mut self, side: Side, scene: &Scene<'_>) {

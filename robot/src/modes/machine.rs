@@ -170,7 +170,7 @@ impl Machine {
                 Phase::Damped
             }
             Phase::Damped => self.leave_damped(inputs.start).phase,
-            Phase::StandUp if lowers => Phase::LieDown,
+            Phase::StandUp if lowers => self.turn_back(Mode::Stance, Phase::LieDown),
             Phase::StandUp if inputs.arrived => Phase::Recentre,
             Phase::Recentre if inputs.arrived => {
                 self.mode = Mode::Stance;
@@ -178,7 +178,9 @@ impl Machine {
             }
             Phase::Stance if lowers => Phase::LieDown,
             Phase::Stance => side_wanted.map_or(Phase::Stance, Phase::ShiftTorso),
-            Phase::ShiftTorso(side) if side_wanted != Some(side) => Phase::Recentre,
+            Phase::ShiftTorso(side) if side_wanted != Some(side) => {
+                self.turn_back(Mode::Gripper(side), Phase::Recentre)
+            }
             Phase::ShiftTorso(side) if inputs.arrived => Phase::LiftFoot(side),
             Phase::LiftFoot(side) if side_wanted != Some(side) => {
                 if inputs.airborne {
@@ -200,13 +202,19 @@ impl Machine {
                 }
             }
             Phase::LowerFoot(_) if inputs.arrived => Phase::Recentre,
-            Phase::LieDown if !lowers => Phase::StandUp,
+            Phase::LieDown if !lowers => self.turn_back(Mode::LieDown, Phase::StandUp),
             Phase::LieDown if inputs.arrived => {
                 self.mode = self.goal;
                 Phase::Damped
             }
             phase => phase,
         }
+    }
+
+    /// Half-way to a mode: counts as coming from it, so that goal and mode differ until the way back is done.
+    fn turn_back(&mut self, from: Mode, phase: Phase) -> Phase {
+        self.mode = from;
+        phase
     }
 
     fn leave_damped(mut self, start: Start) -> Self {
@@ -317,6 +325,7 @@ mod tests {
         assert_eq!(sut.phase(), Phase::LiftFoot(Side::Left));
         ask(&mut sut, Mode::Stance);
         assert_eq!(sut.phase(), Phase::Stow(Side::Left));
+        assert_ne!(sut.mode(), sut.goal(), "not there yet");
         assert_eq!(run(&mut sut, &calm()).last(), Some(&Phase::Stance));
     }
 

@@ -1,0 +1,79 @@
+//! The control step allocates nothing, in any phase.
+
+mod session;
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+};
+
+use locoman_robot::{
+    control::Inputs,
+    joints::Side,
+    modes::{Mode, Phase},
+    plant::Plant,
+};
+use nalgebra::Isometry3;
+use session::Session;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting what each thread asks for.
+struct Counting;
+
+// SAFETY: every call goes to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller's promises are those of the system's allocator.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Runs for a while with the operator as he is; returns what the control steps allocated.
+fn allocations(session: &mut Session, seconds: f64) -> usize {
+    let mut allocated = 0;
+    for _ in 0..(seconds * 400.0) as usize {
+        let sensors = session.plant.exchange(&session.command).unwrap();
+        session.time_ns = sensors.time_ns;
+        if let Some(operator) = &mut session.operator {
+            operator.received_ns = sensors.time_ns;
+            operator.sequence += 1;
+        }
+        let inputs = Inputs { command: session.operator, ..Inputs::default() };
+        let before = ALLOCATIONS.get();
+        session.command = session.controller.tick(sensors.time_ns, &sensors, &inputs);
+        allocated += ALLOCATIONS.get() - before;
+    }
+    allocated
+}
+
+#[test]
+fn the_control_step_allocates_nothing_in_any_phase() {
+    let mut sut = Session::new("lying", "hw", 1);
+    let mut allocated = allocations(&mut sut, 7.0);
+    assert_eq!(sut.snapshot().phase, Phase::Stance);
+    sut.join();
+    sut.operator().mode = Some(Mode::Gripper(Side::Right));
+    sut.operator().mode_request = 1;
+    allocated += allocations(&mut sut, 6.0);
+    assert_eq!(sut.snapshot().phase, Phase::SingleGripper(Side::Right));
+    sut.operator().engagement = 1;
+    sut.operator().palms[0] = Some(Isometry3::translation(0.05, 0.0, 0.02));
+    allocated += allocations(&mut sut, 1.0);
+    sut.operator().mode = Some(Mode::LieDown);
+    sut.operator().mode_request = 2;
+    allocated += allocations(&mut sut, 14.0);
+    assert_eq!(sut.snapshot().phase, Phase::Damped);
+    assert_eq!(allocated, 0);
+}
