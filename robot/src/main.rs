@@ -112,7 +112,9 @@ fn control(config: RobotConfig, args: &RunArgs) -> anyhow::Result<()> {
     let mut controller = Controller::new(config, options);
     let interrupts = count_interrupts()?;
     if !realtime::run_before_others() {
-        tracing::info!("no real-time priority (it takes root or an rtprio limit); a busy machine will be felt");
+        tracing::info!(
+            "no real-time priority (it takes root or an rtprio limit); a busy machine will be felt"
+        );
     }
     tracing::info!(listen = ?args.listen, sim = %args.sim, "control loop runs; Ctrl-C lies down and ends");
     run(plant.as_mut(), &mut controller, &mut inbox, &mut outbox, || {

@@ -2,6 +2,8 @@
 //!
 //! Errors are against the simulator's truth, with the sensors' imperfections on (profile `hw`).
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic in a test is the report")]
+
 mod session;
 
 use locoman_robot::{

@@ -183,11 +183,8 @@ impl Machine {
             }
             Phase::ShiftTorso(side) if inputs.arrived => Phase::LiftFoot(side),
             Phase::LiftFoot(side) if side_wanted != Some(side) => {
-                if inputs.airborne {
-                    Phase::Stow(side)
-                } else {
-                    Phase::Recentre
-                }
+                let back = if inputs.airborne { Phase::Stow(side) } else { Phase::Recentre };
+                self.turn_back(Mode::Gripper(side), back)
             }
             Phase::LiftFoot(side) if inputs.arrived => {
                 self.mode = Mode::Gripper(side);

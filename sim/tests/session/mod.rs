@@ -1,6 +1,7 @@
 //! Robot and simulator in lockstep, with a scripted operator.
 
 #![allow(dead_code, reason = "each test program uses its part")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic in a test is the report")]
 
 use std::path::PathBuf;
 
@@ -73,7 +74,7 @@ impl Session {
         if self.snapshot().phase.is_balanced() {
             self.worst_tilt = self.worst_tilt.max(tilt);
         }
-        if std::env::var_os("TRACE").is_some() && self.time_ns % 100_000_000 == 0 {
+        if std::env::var_os("TRACE").is_some() && self.time_ns.is_multiple_of(100_000_000) {
             let s = self.snapshot();
             println!(
                 "{:6.2} {:?} z {:.4} tilt {:.4} force {:.1?} est {:.4?} sev {:?} ff {}",
