@@ -15,6 +15,7 @@ use crate::latency::Latency;
 use crate::latest::lock;
 use crate::observe::Observation;
 use crate::pilot::Note;
+use crate::replay::Rewind;
 use crate::stick::Hand;
 
 /// Events kept for the console.
@@ -74,6 +75,8 @@ pub struct Board {
     pub mode: Mutex<Option<Mode>>,
     /// A person switches the autopilot.
     pub auto: Mutex<Option<bool>>,
+    /// Makes a replay begin anew.
+    pub rewind: Arc<Rewind>,
     /// What the pilot does.
     pub pilot: Mutex<PilotStatus>,
     /// Sequence and time of the commands sent last.

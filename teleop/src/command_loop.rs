@@ -18,6 +18,9 @@ use crate::robot_view::RobotView;
 /// Commands whose sending time is remembered until the robot has answered: a second's worth.
 const SENT_KEPT: usize = 64;
 
+/// A recording that begins anew does so this much later: longer than a frame that is already waiting.
+const REWIND_LEAD_NS: u64 = 50_000_000;
+
 /// What the thread sends with.
 #[derive(Debug)]
 pub struct Senders {
@@ -45,6 +48,9 @@ pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Sender
             auto: lock(&board.auto).take(),
         };
         let (command, capture_ns) = pilot.step(now_ns, &inputs);
+        if pilot.take_begin() {
+            board.rewind.at(now_ns + REWIND_LEAD_NS);
+        }
         send(&mut senders, command, capture_ns, board, tap, &pilot);
         if capture_ns > sent_capture_ns {
             sent_capture_ns = capture_ns;

@@ -84,6 +84,7 @@ pub struct Pilot {
     robot_source: Option<u64>,
     notes: Vec<Note>,
     waiting_for: &'static str,
+    begin: bool,
 }
 
 impl Pilot {
@@ -100,7 +101,13 @@ impl Pilot {
             robot_source: None,
             notes: Vec::new(),
             waiting_for: "",
+            begin: false,
         }
+    }
+
+    /// Whether the recording is to begin anew; asked once.
+    pub fn take_begin(&mut self) -> bool {
+        std::mem::take(&mut self.begin)
     }
 
     /// What happened since the last call.
@@ -202,6 +209,10 @@ impl Pilot {
             Step::Engage => Some((Device::Tracker, Drive::Tracker)),
             Step::Request(mode) => {
                 self.ask(mode);
+                None
+            }
+            Step::Begin => {
+                self.begin = true;
                 None
             }
             Step::Wait => None,

@@ -3,6 +3,9 @@
 //! Capture times are moved to this machine's clock, so that everything behind (latency, staleness, the
 //! robot's watchdogs) works as with cameras. At the end the recording begins again, one frame period later.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use locoman_vision::image::Frame;
 use locoman_vision::source::{FrameSource, SourceError};
 
@@ -11,6 +14,22 @@ pub type Reopen = Box<dyn FnMut() -> Result<Box<dyn FrameSource>, SourceError> +
 
 /// Between turns of a recording that does not tell its frame period.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
+
+/// A wish that a replay begin anew.
+#[derive(Debug, Default)]
+pub struct Rewind(AtomicU64);
+
+impl Rewind {
+    /// The first frame is to be captured at this time (not 0).
+    pub fn at(&self, start_ns: u64) {
+        self.0.store(start_ns, Ordering::Relaxed);
+    }
+
+    fn take(&self) -> Option<u64> {
+        let start_ns = self.0.swap(0, Ordering::Relaxed);
+        (start_ns != 0).then_some(start_ns)
+    }
+}
 
 /// A source that never ends; its capture times count from `start_ns`.
 pub struct Replay {
@@ -23,11 +42,12 @@ pub struct Replay {
     period_ns: u64,
     skipped: u64,
     turns: u64,
+    rewind: Arc<Rewind>,
 }
 
 impl Replay {
     /// Opens the recording; its first frame will be captured at `start_ns`.
-    pub fn open(mut reopen: Reopen, start_ns: u64) -> Result<Self, SourceError> {
+    pub fn open(mut reopen: Reopen, start_ns: u64, rewind: Arc<Rewind>) -> Result<Self, SourceError> {
         let source = reopen()?;
         Ok(Self {
             reopen,
@@ -38,12 +58,24 @@ impl Replay {
             period_ns: DEFAULT_PERIOD_NS,
             skipped: 0,
             turns: 0,
+            rewind,
         })
     }
 
     /// How often it has begun again.
     pub fn turns(&self) -> u64 {
         self.turns
+    }
+
+    /// The recording's first frame, captured at `start_ns`.
+    fn begin(&mut self, start_ns: u64) -> Result<Option<Frame>, SourceError> {
+        self.start_ns = start_ns;
+        self.last_ns = self.first_ns.unwrap_or(0);
+        self.turns += 1;
+        self.skipped += self.source.skipped();
+        self.source = (self.reopen)()?;
+        let frame = self.source.next_frame()?;
+        Ok(frame.map(|frame| self.moved(frame)))
     }
 
     fn moved(&mut self, mut frame: Frame) -> Frame {
@@ -63,17 +95,14 @@ impl Replay {
 
 impl FrameSource for Replay {
     fn next_frame(&mut self) -> Result<Option<Frame>, SourceError> {
+        if let Some(start_ns) = self.rewind.take() {
+            return self.begin(start_ns);
+        }
         if let Some(frame) = self.source.next_frame()? {
             return Ok(Some(self.moved(frame)));
         }
         let Some(first) = self.first_ns else { return Ok(None) };
-        self.start_ns += self.last_ns.saturating_sub(first) + self.period_ns;
-        self.last_ns = first;
-        self.turns += 1;
-        self.skipped += self.source.skipped();
-        self.source = (self.reopen)()?;
-        let frame = self.source.next_frame()?;
-        Ok(frame.map(|frame| self.moved(frame)))
+        self.begin(self.start_ns + self.last_ns.saturating_sub(first) + self.period_ns)
     }
 
     fn skipped(&self) -> u64 {
@@ -100,7 +129,18 @@ mod tests {
     }
 
     fn replay(frames: &'static [(usize, u64)]) -> Replay {
-        Replay::open(Box::new(|| Ok(Box::new(Script(frames.to_vec().into_iter())))), 1_000_000_000).unwrap()
+        let reopen = Box::new(|| Ok(Box::new(Script(frames.to_vec().into_iter())) as Box<dyn FrameSource>));
+        Replay::open(reopen, 1_000_000_000, Arc::default()).unwrap()
+    }
+
+    #[test]
+    fn a_recording_begins_anew_on_request() {
+        const MS: u64 = 1_000_000;
+        let mut sut = replay(&[(0, 50 * MS), (0, 80 * MS), (0, 110 * MS)]);
+        let mut next_ms = |sut: &mut Replay| sut.next_frame().unwrap().unwrap().capture_ns / MS;
+        assert_eq!((next_ms(&mut sut), next_ms(&mut sut)), (1000, 1030));
+        sut.rewind.at(1100 * MS);
+        assert_eq!((next_ms(&mut sut), next_ms(&mut sut), next_ms(&mut sut)), (1100, 1130, 1160));
     }
 
     #[test]

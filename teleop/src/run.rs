@@ -70,9 +70,10 @@ struct Eyes {
 pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     // Everything that can be wrong is looked at before anything starts.
     let config = Config::read(&options.configs)?;
+    let board = Arc::new(Board::default());
     let sight = match &options.operator {
         Operator::Joystick => None,
-        operator => Some(open_eyes(operator, options)?),
+        operator => Some(open_eyes(operator, options, &board)?),
     };
     let listener = TcpListener::bind(&options.console).map_err(|error| {
         anyhow!(
@@ -89,7 +90,6 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
         None => (None, Tap::default()),
     };
     let link = Link::open(&options.robot, &options.endpoints)?;
-    let board = Arc::new(Board::default());
     let subscriptions = listen(&link, &board, &tap)?;
     let stop = Arc::new(StopButton::new(link.sender()?, Arc::clone(&board)));
     let (rig, eyes) = match sight {
@@ -142,7 +142,11 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
 }
 
 /// The tracker and the frames, checked.
-fn open_eyes(operator: &Operator, options: &Options) -> Result<(Tracker, Box<dyn FrameSource>)> {
+fn open_eyes(
+    operator: &Operator,
+    options: &Options,
+    board: &Board,
+) -> Result<(Tracker, Box<dyn FrameSource>)> {
     let rig = Rig::load(&options.rig)?;
     let shells = ShellSet::load(&options.shells)?;
     let source: Box<dyn FrameSource> = match operator {
@@ -150,7 +154,8 @@ fn open_eyes(operator: &Operator, options: &Options) -> Result<(Tracker, Box<dyn
             sources::check(path)?;
             let (path, rig) = (path.clone(), rig.clone());
             let reopen = Box::new(move || sources::recording(&path, &rig));
-            Box::new(Replay::open(reopen, monotonic_ns() + REPLAY_LEAD_NS)?)
+            let rewind = Arc::clone(&board.rewind);
+            Box::new(Replay::open(reopen, monotonic_ns() + REPLAY_LEAD_NS, rewind)?)
         }
         Operator::Cameras | Operator::Joystick => sources::cameras(&rig)?,
     };
