@@ -9,6 +9,13 @@ const FOOT_RADIUS_M = 0.02;
 const TARGET = 0xffb454;
 const BACKGROUND = 0x151b24;
 
+/** Without a GPU drawing takes the processor away from tracking, on the same computer: draw seldom. */
+const SOFTWARE_FPS = 8;
+function isSoftware(gl) {
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  return /swiftshader|llvmpipe|software/i.test(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : '');
+}
+
 function setPose(object, pose) {
   object.visible = Boolean(pose);
   if (!pose) return;
@@ -62,8 +69,10 @@ function operatorShells(scene) {
 }
 
 export async function makeScene(canvas) {
-  const renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
-  renderer.setPixelRatio(Math.min(window.devicePixelRatio, 1.5));
+  const renderer = new WebGLRenderer({ canvas, antialias: true });
+  const slow = isSoftware(renderer.getContext());
+  renderer.setPixelRatio(slow ? 1 : Math.min(window.devicePixelRatio, 1.5));
+  const framePeriodMs = 1000 / (slow ? SOFTWARE_FPS : 60);
   const scene = new Scene();
   scene.background = new Color(BACKGROUND);
   scene.fog = new Fog(BACKGROUND, 3, 8);
@@ -115,13 +124,14 @@ export async function makeScene(canvas) {
   };
   new ResizeObserver(resize).observe(canvas.parentElement);
   resize();
-  const draw = () => {
+  let drawn = -Infinity;
+  const draw = (now) => {
     requestAnimationFrame(draw);
-    if (!dirty) return; // software rendering is dear: only what has changed is drawn
-    dirty = false;
+    if (!dirty || now - drawn < framePeriodMs) return;
+    [dirty, drawn] = [false, now];
     renderer.render(scene, camera);
   };
-  draw();
+  requestAnimationFrame(draw);
 
   return {
     robot(state) {

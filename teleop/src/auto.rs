@@ -1,9 +1,8 @@
 //! Engaging without a person: for replays, which have no hand on a dead-man.
 //!
 //! A pure function of time, robot and tracker: stand up if need be, ask for the mode once the robot stands
-//! and the operator is seen; when the mode has arrived, begin the recording anew and engage. Recordings begin
-//! at rest: engaged in the middle of a motion, the robot would start from the edge of what it can reach.
-//! A person who takes over in any way switches it off; only a person switches it on again.
+//! and the operator is seen, engage when the mode has arrived. A person who takes over in any way switches
+//! it off; only a person switches it on again.
 
 use locoman_protocol::messages::{Mode, Severity};
 
@@ -24,8 +23,6 @@ pub enum Step {
     Wait,
     /// Ask the robot for a mode.
     Request(Mode),
-    /// Begin the recording anew.
-    Begin,
     /// Engage, or stay engaged.
     Engage,
 }
@@ -37,15 +34,13 @@ pub struct Auto {
     enabled: bool,
     seen_since_ns: Option<u64>,
     requested_ns: Option<u64>,
-    /// The recording has begun anew for this engagement.
-    begun: bool,
     not_before_ns: u64,
 }
 
 impl Auto {
     /// Enabled, heading for `mode`.
     pub fn new(mode: Mode) -> Self {
-        Self { mode, enabled: true, seen_since_ns: None, requested_ns: None, begun: false, not_before_ns: 0 }
+        Self { mode, enabled: true, seen_since_ns: None, requested_ns: None, not_before_ns: 0 }
     }
 
     /// Whether it acts.
@@ -57,13 +52,11 @@ impl Auto {
     pub fn enable(&mut self, enabled: bool) {
         self.enabled = enabled;
         self.requested_ns = None;
-        self.begun = false;
     }
 
     /// The robot ended the engagement: pause before the next.
     pub fn disengaged(&mut self, now_ns: u64) {
         self.not_before_ns = now_ns + PAUSE_NS;
-        self.begun = false;
     }
 
     /// One step. `robot` is `None` while it is silent; once `engaged`, shells out of sight do not end it.
@@ -83,18 +76,8 @@ impl Auto {
             return Step::Wait;
         }
         if robot.in_mode(self.mode) {
-            if engaged {
-                return Step::Engage;
-            }
-            if !self.begun {
-                self.begun = true;
-                self.seen_since_ns = None;
-                return Step::Begin;
-            }
-            let seen = seen_for_ns.is_some_and(|ns| ns >= SEEN_NS);
-            return if seen { Step::Engage } else { Step::Wait };
+            return if engaged || seen_for_ns.is_some() { Step::Engage } else { Step::Wait };
         }
-        self.begun = false;
         if robot.mode != robot.goal {
             return Step::Wait;
         }
@@ -161,23 +144,14 @@ mod tests {
         let lifting = robot(Mode::Stance, Mode::RightGripper);
         assert_eq!(sut.step(7000 * MS, Some(&lifting), Some(&seen()), false), Step::Wait);
         let ready = robot(Mode::RightGripper, Mode::RightGripper);
-        let mut step = |ms: u64, engaged| sut.step(ms * MS, Some(&ready), Some(&seen()), engaged);
-        assert_eq!(step(9000, false), Step::Begin);
-        assert_eq!(step(9016, false), Step::Wait, "not yet seen at the beginning");
-        assert_eq!(step(9600, false), Step::Engage);
-        assert_eq!(step(9616, true), Step::Engage);
+        assert_eq!(sut.step(9000 * MS, Some(&ready), Some(&seen()), false), Step::Engage);
         sut.enable(false);
-        let mut step = |ms: u64| sut.step(ms * MS, Some(&ready), Some(&seen()), false);
-        assert_eq!(step(9700), Step::Wait, "a person took over");
+        assert_eq!(sut.step(9100 * MS, Some(&ready), Some(&seen()), false), Step::Wait, "a person took over");
         sut.enable(true);
-        let mut step = |ms: u64| sut.step(ms * MS, Some(&ready), Some(&seen()), false);
-        assert_eq!(step(9800), Step::Begin);
-        assert_eq!(step(9816), Step::Wait);
-        assert_eq!(step(10_400), Step::Engage);
-        sut.disengaged(10_500 * MS);
-        let mut step = |ms: u64| sut.step(ms * MS, Some(&ready), Some(&seen()), false);
-        assert_eq!(step(10_600), Step::Wait, "the robot let go");
-        assert_eq!(step(11_600), Step::Begin);
+        assert_eq!(sut.step(9200 * MS, Some(&ready), Some(&seen()), false), Step::Engage);
+        sut.disengaged(9300 * MS);
+        assert_eq!(sut.step(9400 * MS, Some(&ready), Some(&seen()), false), Step::Wait, "the robot let go");
+        assert_eq!(sut.step(10_400 * MS, Some(&ready), Some(&seen()), false), Step::Engage);
     }
 
     #[test]

@@ -15,7 +15,6 @@ use crate::latency::Latency;
 use crate::latest::lock;
 use crate::observe::Observation;
 use crate::pilot::Note;
-use crate::replay::Rewind;
 use crate::stick::Hand;
 
 /// Events kept for the console.
@@ -75,8 +74,6 @@ pub struct Board {
     pub mode: Mutex<Option<Mode>>,
     /// A person switches the autopilot.
     pub auto: Mutex<Option<bool>>,
-    /// Makes a replay begin anew.
-    pub rewind: Arc<Rewind>,
     /// What the pilot does.
     pub pilot: Mutex<PilotStatus>,
     /// Sequence and time of the commands sent last.
@@ -85,6 +82,8 @@ pub struct Board {
     pub latency: Mutex<Latency>,
     /// The last events.
     pub events: Mutex<VecDeque<Happened>>,
+    /// The recorded operator waits: the autopilot has not engaged yet.
+    pub hold_replay: Arc<AtomicBool>,
     /// Everything ends.
     pub stop: AtomicBool,
 }

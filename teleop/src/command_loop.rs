@@ -1,11 +1,12 @@
 //! The command thread: at a steady rate asks the pilot, sends the command, notes what happened.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Event, OperatorCommand, RobotState};
-use locoman_protocol::{Received, Sender};
+use locoman_protocol::{Received, Sender, realtime};
 
 use crate::board::{Board, PilotStatus};
 use crate::config::Config;
@@ -18,9 +19,6 @@ use crate::robot_view::RobotView;
 /// Commands whose sending time is remembered until the robot has answered: a second's worth.
 const SENT_KEPT: usize = 64;
 
-/// A recording that begins anew does so this much later: longer than a frame that is already waiting.
-const REWIND_LEAD_NS: u64 = 50_000_000;
-
 /// What the thread sends with.
 #[derive(Debug)]
 pub struct Senders {
@@ -32,6 +30,7 @@ pub struct Senders {
 
 /// Runs until the board says stop; ends with one command that says "hold".
 pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Senders, tap: &Tap) {
+    realtime::run_before_others();
     let period = Duration::from_secs_f64(1.0 / config.command.rate_hz);
     let silent_ns = config.command.browser_silent_ms * 1_000_000;
     let mut due = Instant::now();
@@ -48,9 +47,7 @@ pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Sender
             auto: lock(&board.auto).take(),
         };
         let (command, capture_ns) = pilot.step(now_ns, &inputs);
-        if pilot.take_begin() {
-            board.rewind.at(now_ns + REWIND_LEAD_NS);
-        }
+        board.hold_replay.store(pilot.operator_waits(), Ordering::Relaxed);
         send(&mut senders, command, capture_ns, board, tap, &pilot);
         if capture_ns > sent_capture_ns {
             sent_capture_ns = capture_ns;

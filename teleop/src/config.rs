@@ -117,15 +117,29 @@ pub struct Tracking {
     pub predicted_max_ms: u64,
     /// Oldest result that moves anything.
     pub stale_ms: u64,
-    /// A larger step between two sightings starts a new engagement.
+    /// A larger step between two sightings, beyond what the speeds below allow, starts a new engagement.
     pub jump_m: f64,
     /// The same for rotation.
     pub jump_rad: f64,
+    /// Fastest translation of an operator.
+    pub speed_m_s: f64,
+    /// Fastest rotation of an operator.
+    pub speed_rad_s: f64,
+    /// Longest time between two sightings for which speed excuses a step.
+    pub jump_gap_ms: u64,
 }
 
 impl Default for Tracking {
     fn default() -> Self {
-        Self { predicted_max_ms: 100, stale_ms: 400, jump_m: 0.10, jump_rad: 0.26 }
+        Self {
+            predicted_max_ms: 100,
+            stale_ms: 400,
+            jump_m: 0.06,
+            jump_rad: 0.15,
+            speed_m_s: 0.5,
+            speed_rad_s: 2.0,
+            jump_gap_ms: 250,
+        }
     }
 }
 
@@ -255,6 +269,9 @@ impl Config {
             ("stick.gripper_limit_rad", k.gripper_limit_rad, TINY..=3.0),
         ];
         let more = [
+            ("tracking.speed_m_s", t.speed_m_s, 0.0..=5.0),
+            ("tracking.speed_rad_s", t.speed_rad_s, 0.0..=5.0),
+            ("tracking.jump_gap_ms", t.jump_gap_ms as f64, 0.0..=1000.0),
             ("console.preview_hz", p.preview_hz, 1.0..=30.0),
             ("console.status_hz", p.status_hz, 5.0..=60.0),
         ];
@@ -284,7 +301,7 @@ mod tests {
         assert_eq!(config, Config::default());
         // Every key is there: without any of its lines the file would still equal the defaults.
         let keys = SHIPPED.lines().filter(|l| l.contains(" = ") && !l.starts_with('#')).count();
-        assert_eq!(keys, 29);
+        assert_eq!(keys, 32);
     }
 
     #[test]

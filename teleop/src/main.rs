@@ -101,7 +101,8 @@ struct RunArgs {
     files: Files,
     #[command(flatten)]
     peer: Peer,
-    /// With --replay: bring the robot into this mode and engage without a person
+    /// With --replay: bring the robot into this mode and engage without a person; the recorded operator
+    /// waits at the recording's begin until then
     #[arg(long, value_name = "MODE", requires = "replay")]
     auto_engage: Option<AutoMode>,
     /// Record the session
@@ -169,13 +170,23 @@ fn main() -> ExitCode {
     match start_log(&cli.log).and_then(|()| obey(cli)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            #[expect(clippy::print_stderr, reason = "the one report at the edge of the program")]
-            {
-                eprintln!("error: {error:#}");
-            }
+            report(&error);
             ExitCode::FAILURE
         }
     }
+}
+
+/// The error and its causes; a cause that its effect has quoted already is not said twice.
+#[expect(clippy::print_stderr, reason = "the one report at the edge of the program")]
+fn report(error: &anyhow::Error) {
+    let mut said = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !said.contains(&cause) {
+            said += if said.is_empty() { "" } else { ": " };
+            said += &cause;
+        }
+    }
+    eprintln!("error: {said}");
 }
 
 fn start_log(level: &str) -> Result<()> {

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! so that an engagement starts at the identity whatever the poses and scales are. A body that is not seen
-//! is absent. One that returns near where it was last seen goes on; one that returns further away than the
-//! configured jump ends the engagement in place of moving the robot.
+//! is absent. One that returns near where it was last seen goes on; one that returns further away than it
+//! can have moved ends the engagement in place of moving the robot.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -42,6 +42,24 @@ impl std::fmt::Display for Jump {
 struct Anchor {
     origin: Isometry3<f64>,
     last: Isometry3<f64>,
+    last_ns: u64,
+}
+
+impl Anchor {
+    fn new(pose: &Isometry3<f64>, now_ns: u64) -> Self {
+        Self { origin: *pose, last: *pose, last_ns: now_ns }
+    }
+
+    /// The jump, if the body cannot have come this far since it was last seen.
+    fn jump(&self, body: Body, now: &Isometry3<f64>, now_ns: u64, limits: &Tracking) -> Option<Jump> {
+        let gap_ns = now_ns.saturating_sub(self.last_ns).min(limits.jump_gap_ms * 1_000_000);
+        let gap_s = gap_ns as f64 * 1e-9;
+        let distance_m = (now.translation.vector - self.last.translation.vector).norm();
+        let angle_rad = self.last.rotation.angle_to(&now.rotation);
+        let too_far = distance_m > limits.jump_m + limits.speed_m_s * gap_s;
+        let too_much = angle_rad > limits.jump_rad + limits.speed_rad_s * gap_s;
+        (too_far || too_much).then_some(Jump { body, distance_m, angle_rad })
+    }
 }
 
 /// Maps an operator's motion since engagement.
@@ -66,7 +84,8 @@ impl Mapper {
             tracking: config.tracking,
             heading_from_world: heading(observation.shell(Shell::Torso)).inverse(),
             anchors: Body::ALL.map(|body| {
-                observation.shell(shell_of(body)).map(|&pose| Anchor { origin: pose, last: pose })
+                let capture_ns = observation.capture_ns;
+                observation.shell(shell_of(body)).map(|pose| Anchor::new(pose, capture_ns))
             }),
             openings: openings.map(|opening| if opening.is_finite() { opening.clamp(0.0, 1.0) } else { 0.0 }),
             capture_ns: observation.capture_ns,
@@ -82,12 +101,12 @@ impl Mapper {
         for body in Body::ALL {
             let Some(&world_from_body) = observation.shell(shell_of(body)) else { continue };
             let index = body as usize;
-            let anchor =
-                self.anchors[index].get_or_insert(Anchor { origin: world_from_body, last: world_from_body });
-            if let Some(jump) = jump(body, &anchor.last, &world_from_body, &self.tracking) {
+            let anchor = self.anchors[index]
+                .get_or_insert_with(|| Anchor::new(&world_from_body, observation.capture_ns));
+            if let Some(jump) = anchor.jump(body, &world_from_body, observation.capture_ns, &self.tracking) {
                 return Err(jump);
             }
-            anchor.last = world_from_body;
+            (anchor.last, anchor.last_ns) = (world_from_body, observation.capture_ns);
             let (translation, rotation) = match body {
                 Body::Torso => (self.scale.torso_translation, self.scale.torso_rotation),
                 Body::RightPalm | Body::LeftPalm => (self.scale.hand_translation, self.scale.hand_rotation),
@@ -152,16 +171,6 @@ fn displacement(
         Translation3::from(heading_from_world * (moved * translation_scale)),
         UnitQuaternion::from_scaled_axis(heading_from_world * (turned * rotation_scale)),
     )
-}
-
-fn jump(body: Body, last: &Isometry3<f64>, now: &Isometry3<f64>, limits: &Tracking) -> Option<Jump> {
-    let distance_m = (now.translation.vector - last.translation.vector).norm();
-    let angle_rad = last.rotation.angle_to(&now.rotation);
-    (distance_m > limits.jump_m || angle_rad > limits.jump_rad).then_some(Jump {
-        body,
-        distance_m,
-        angle_rad,
-    })
 }
 
 /// Gripper opening from the angle of the rotation between palm and thumb: 0 closed, 1 open.

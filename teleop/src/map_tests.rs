@@ -92,6 +92,8 @@ proptest! {
     ) {
         let mut config = Config::default();
         config.scale.hand_translation = s;
+        config.tracking.jump_m = 1.0;
+        config.tracking.jump_rad = 1.0;
         let step = Vector3::from(step);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::y() * turn);
         let mut sut = Mapper::engage(&config, &palm_at(start), [0.0; 2]);
@@ -136,6 +138,19 @@ fn a_body_that_returns_nearby_goes_on_and_one_that_returns_far_away_is_a_jump() 
     let jump = sut.map(&palm_at(Isometry3::translation(0.3, 0.0, 0.0))).unwrap_err();
     assert_eq!(jump.body, Body::RightPalm);
     assert!((jump.distance_m - 0.25).abs() < EXACT);
+}
+
+#[test]
+fn the_longer_a_body_was_not_seen_the_further_it_may_have_gone_up_to_a_limit() {
+    let after = |gap_ms: u64, x_m: f64| {
+        let start = palm_at(Isometry3::identity());
+        let mut end = palm_at(Isometry3::translation(x_m, 0.0, 0.0));
+        end.capture_ns = start.capture_ns + gap_ms * 1_000_000;
+        Mapper::engage(&Config::default(), &start, [0.0; 2]).map(&end).is_ok()
+    };
+    assert!(after(0, 0.059) && !after(0, 0.061));
+    assert!(after(200, 0.159) && !after(200, 0.161));
+    assert!(after(10_000, 0.184) && !after(10_000, 0.186));
 }
 
 #[test]

@@ -84,7 +84,6 @@ pub struct Pilot {
     robot_source: Option<u64>,
     notes: Vec<Note>,
     waiting_for: &'static str,
-    begin: bool,
 }
 
 impl Pilot {
@@ -101,13 +100,7 @@ impl Pilot {
             robot_source: None,
             notes: Vec::new(),
             waiting_for: "",
-            begin: false,
         }
-    }
-
-    /// Whether the recording is to begin anew; asked once.
-    pub fn take_begin(&mut self) -> bool {
-        std::mem::take(&mut self.begin)
     }
 
     /// What happened since the last call.
@@ -118,6 +111,11 @@ impl Pilot {
     /// Whether an autopilot acts; `None` if there is none.
     pub fn auto_enabled(&self) -> Option<bool> {
         self.auto.as_ref().map(Auto::enabled)
+    }
+
+    /// Whether a recorded operator should wait: the autopilot acts, but has not engaged.
+    pub fn operator_waits(&self) -> bool {
+        self.auto_enabled() == Some(true) && self.engagement.is_none()
     }
 
     /// Why nothing moves; empty while engaged.
@@ -209,10 +207,6 @@ impl Pilot {
             Step::Engage => Some((Device::Tracker, Drive::Tracker)),
             Step::Request(mode) => {
                 self.ask(mode);
-                None
-            }
-            Step::Begin => {
-                self.begin = true;
                 None
             }
             Step::Wait => None,

@@ -2,107 +2,123 @@
 //!
 //! Capture times are moved to this machine's clock, so that everything behind (latency, staleness, the
 //! robot's watchdogs) works as with cameras. At the end the recording begins again, one frame period later.
+//!
+//! A recorded operator can be asked to wait, as a person would until the robot is ready: while it is held,
+//! the recording stands at its first instant; let go, it plays from there. So an engagement by the autopilot
+//! always begins at the pose that the recording begins with.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use locoman_vision::image::Frame;
 use locoman_vision::source::{FrameSource, SourceError};
 
+use crate::feed::SET_TOLERANCE_NS;
+
 /// Opens the recording anew for each turn.
 pub type Reopen = Box<dyn FnMut() -> Result<Box<dyn FrameSource>, SourceError> + Send>;
 
-/// Between turns of a recording that does not tell its frame period.
+/// Between instants of a recording that does not tell its frame period.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
-/// A wish that a replay begin anew.
-#[derive(Debug, Default)]
-pub struct Rewind(AtomicU64);
-
-impl Rewind {
-    /// The first frame is to be captured at this time (not 0).
-    pub fn at(&self, start_ns: u64) {
-        self.0.store(start_ns, Ordering::Relaxed);
-    }
-
-    fn take(&self) -> Option<u64> {
-        let start_ns = self.0.swap(0, Ordering::Relaxed);
-        (start_ns != 0).then_some(start_ns)
-    }
-}
-
-/// A source that never ends; its capture times count from `start_ns`.
+/// A source that never ends.
 pub struct Replay {
     reopen: Reopen,
     source: Box<dyn FrameSource>,
-    start_ns: u64,
-    /// First capture time of the recording, once known.
-    first_ns: Option<u64>,
-    last_ns: u64,
+    hold: Arc<AtomicBool>,
+    /// The first instant of the recording, with its own capture times.
+    opening: Vec<Frame>,
+    /// What is still to be delivered of it.
+    waiting: VecDeque<Frame>,
+    /// Where the recording's first instant lies on this machine's clock.
+    base_ns: u64,
+    /// The latest capture time delivered, on this machine's clock.
+    emitted_ns: Option<u64>,
     period_ns: u64,
+    /// Whether the source stands at its begin.
+    rewound: bool,
     skipped: u64,
-    turns: u64,
-    rewind: Arc<Rewind>,
 }
 
 impl Replay {
-    /// Opens the recording; its first frame will be captured at `start_ns`.
-    pub fn open(mut reopen: Reopen, start_ns: u64, rewind: Arc<Rewind>) -> Result<Self, SourceError> {
+    /// Opens the recording; its first frame will be captured at `start_ns`. While `hold` is set it stands at
+    /// its first instant.
+    pub fn open(mut reopen: Reopen, start_ns: u64, hold: Arc<AtomicBool>) -> Result<Self, SourceError> {
+        let mut source = reopen()?;
+        let mut opening: Vec<Frame> = Vec::new();
+        let mut period_ns = DEFAULT_PERIOD_NS;
+        while let Some(frame) = source.next_frame()? {
+            let first_ns = opening.first().map_or(frame.capture_ns, |first| first.capture_ns);
+            if frame.capture_ns > first_ns + SET_TOLERANCE_NS {
+                period_ns = (frame.capture_ns - first_ns).min(1_000_000_000);
+                break;
+            }
+            opening.push(frame);
+        }
         let source = reopen()?;
         Ok(Self {
             reopen,
             source,
-            start_ns,
-            first_ns: None,
-            last_ns: 0,
-            period_ns: DEFAULT_PERIOD_NS,
+            hold,
+            opening,
+            waiting: VecDeque::new(),
+            base_ns: start_ns,
+            emitted_ns: None,
+            period_ns,
+            rewound: true,
             skipped: 0,
-            turns: 0,
-            rewind,
         })
     }
 
-    /// How often it has begun again.
-    pub fn turns(&self) -> u64 {
-        self.turns
+    /// The next turn begins one period after what was delivered last.
+    fn begin(&mut self) {
+        if let Some(emitted_ns) = self.emitted_ns {
+            self.base_ns = emitted_ns + self.period_ns;
+        }
     }
 
-    /// The recording's first frame, captured at `start_ns`.
-    fn begin(&mut self, start_ns: u64) -> Result<Option<Frame>, SourceError> {
-        self.start_ns = start_ns;
-        self.last_ns = self.first_ns.unwrap_or(0);
-        self.turns += 1;
+    fn rewind(&mut self) -> Result<(), SourceError> {
         self.skipped += self.source.skipped();
         self.source = (self.reopen)()?;
-        let frame = self.source.next_frame()?;
-        Ok(frame.map(|frame| self.moved(frame)))
+        self.rewound = true;
+        Ok(())
     }
 
-    fn moved(&mut self, mut frame: Frame) -> Frame {
-        let first = *self.first_ns.get_or_insert(frame.capture_ns);
-        if frame.capture_ns > self.last_ns && self.last_ns >= first {
-            // Cameras of one instant differ by little; the step between instants is the period.
-            let step = frame.capture_ns - self.last_ns;
-            if step > 2_000_000 {
-                self.period_ns = step.min(1_000_000_000);
-            }
-        }
-        self.last_ns = self.last_ns.max(frame.capture_ns);
-        frame.capture_ns = self.start_ns + frame.capture_ns.saturating_sub(first);
+    fn emit(&mut self, mut frame: Frame) -> Frame {
+        let first_ns = self.opening.first().map_or(0, |first| first.capture_ns);
+        frame.capture_ns = self.base_ns + frame.capture_ns.saturating_sub(first_ns);
+        self.emitted_ns = self.emitted_ns.max(Some(frame.capture_ns));
         frame
     }
 }
 
 impl FrameSource for Replay {
     fn next_frame(&mut self) -> Result<Option<Frame>, SourceError> {
-        if let Some(start_ns) = self.rewind.take() {
-            return self.begin(start_ns);
+        if self.opening.is_empty() {
+            return Ok(None);
         }
-        if let Some(frame) = self.source.next_frame()? {
-            return Ok(Some(self.moved(frame)));
+        loop {
+            if let Some(frame) = self.waiting.pop_front() {
+                return Ok(Some(self.emit(frame)));
+            }
+            if self.hold.load(Ordering::Relaxed) {
+                if !self.rewound {
+                    self.rewind()?;
+                }
+                self.begin();
+                self.waiting = self.opening.clone().into();
+                continue;
+            }
+            if self.rewound {
+                self.begin();
+                self.rewound = false;
+            }
+            match self.source.next_frame()? {
+                Some(frame) => return Ok(Some(self.emit(frame))),
+                None => self.rewind()?,
+            }
         }
-        let Some(first) = self.first_ns else { return Ok(None) };
-        self.begin(self.start_ns + self.last_ns.saturating_sub(first) + self.period_ns)
     }
 
     fn skipped(&self) -> u64 {
@@ -114,6 +130,8 @@ impl FrameSource for Replay {
 mod tests {
     use super::*;
     use locoman_vision::image::Pixels;
+
+    const MS: u64 = 1_000_000;
 
     struct Script(std::vec::IntoIter<(usize, u64)>);
 
@@ -128,35 +146,40 @@ mod tests {
         }
     }
 
-    fn replay(frames: &'static [(usize, u64)]) -> Replay {
-        let reopen = Box::new(|| Ok(Box::new(Script(frames.to_vec().into_iter())) as Box<dyn FrameSource>));
-        Replay::open(reopen, 1_000_000_000, Arc::default()).unwrap()
+    fn replay(frames: &'static [(usize, u64)], hold: &Arc<AtomicBool>) -> Replay {
+        let reopen: Reopen = Box::new(|| Ok(Box::new(Script(frames.to_vec().into_iter()))));
+        Replay::open(reopen, 1000 * MS, Arc::clone(hold)).unwrap()
     }
 
-    #[test]
-    fn a_recording_begins_anew_on_request() {
-        const MS: u64 = 1_000_000;
-        let mut sut = replay(&[(0, 50 * MS), (0, 80 * MS), (0, 110 * MS)]);
-        let mut next_ms = |sut: &mut Replay| sut.next_frame().unwrap().unwrap().capture_ns / MS;
-        assert_eq!((next_ms(&mut sut), next_ms(&mut sut)), (1000, 1030));
-        sut.rewind.at(1100 * MS);
-        assert_eq!((next_ms(&mut sut), next_ms(&mut sut), next_ms(&mut sut)), (1100, 1130, 1160));
+    fn next(sut: &mut Replay) -> (usize, u64) {
+        let frame = sut.next_frame().unwrap().unwrap();
+        (frame.camera, frame.capture_ns / MS)
     }
+
+    const TWO_INSTANTS: &[(usize, u64)] = &[(0, 50 * MS), (1, 51 * MS), (0, 80 * MS), (1, 81 * MS)];
 
     #[test]
     fn a_recording_loops_without_a_gap_in_time() {
-        const MS: u64 = 1_000_000;
-        let mut sut = replay(&[(0, 50 * MS), (1, 51 * MS), (0, 80 * MS), (1, 81 * MS)]);
-        let mut times = Vec::new();
-        for _ in 0..9 {
-            times.push(sut.next_frame().unwrap().unwrap().capture_ns / MS);
-        }
-        assert_eq!(times, [1000, 1001, 1030, 1031, 1060, 1061, 1090, 1091, 1120]);
-        assert_eq!((sut.turns(), sut.skipped()), (2, 3));
+        let mut sut = replay(TWO_INSTANTS, &Arc::default());
+        let times: Vec<u64> = (0..9).map(|_| next(&mut sut).1).collect();
+        assert_eq!(times, [1000, 1001, 1030, 1031, 1061, 1062, 1091, 1092, 1122]);
+    }
+
+    #[test]
+    fn held_it_stands_at_its_first_instant_and_then_plays_from_there() {
+        let hold = Arc::new(AtomicBool::new(true));
+        let mut sut = replay(TWO_INSTANTS, &hold);
+        let held: Vec<_> = (0..5).map(|_| next(&mut sut)).collect();
+        assert_eq!(held, [(0, 1000), (1, 1001), (0, 1031), (1, 1032), (0, 1062)]);
+        hold.store(false, Ordering::Relaxed);
+        let played: Vec<_> = (0..5).map(|_| next(&mut sut)).collect();
+        assert_eq!(played, [(1, 1063), (0, 1093), (1, 1094), (0, 1123), (1, 1124)]);
+        hold.store(true, Ordering::Relaxed);
+        assert_eq!((next(&mut sut), next(&mut sut)), ((0, 1154), (1, 1155)), "back at its begin");
     }
 
     #[test]
     fn an_empty_recording_ends() {
-        assert_eq!(replay(&[]).next_frame().unwrap(), None);
+        assert_eq!(replay(&[], &Arc::default()).next_frame().unwrap(), None);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -71,6 +72,7 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     // Everything that can be wrong is looked at before anything starts.
     let config = Config::read(&options.configs)?;
     let board = Arc::new(Board::default());
+    board.hold_replay.store(options.auto_engage.is_some(), Ordering::Relaxed);
     let sight = match &options.operator {
         Operator::Joystick => None,
         operator => Some(open_eyes(operator, options, &board)?),
@@ -154,8 +156,7 @@ fn open_eyes(
             sources::check(path)?;
             let (path, rig) = (path.clone(), rig.clone());
             let reopen = Box::new(move || sources::recording(&path, &rig));
-            let rewind = Arc::clone(&board.rewind);
-            Box::new(Replay::open(reopen, monotonic_ns() + REPLAY_LEAD_NS, rewind)?)
+            Box::new(Replay::open(reopen, monotonic_ns() + REPLAY_LEAD_NS, Arc::clone(&board.hold_replay))?)
         }
         Operator::Cameras | Operator::Joystick => sources::cameras(&rig)?,
     };
