@@ -52,12 +52,13 @@ const START_AND_END: Duration = Duration::from_secs(60);
 
 const WHAT_TO_PRESS: &str = "
   The recorded operator drives the robot. To take over, in the browser:
-    hold Space    engage (dead-man switch: let go and the robot holds)
-    W A S D Q E   move the gripper; with Shift: turn it
-    I J K L U O   move the torso; with Shift: turn it
-    F / G         close / open the gripper
-    1 2 3 4       stance, right gripper, left gripper, lie down
-    Esc           stop: settle and lie down; twice: damp at once
+    hold Space       engage (dead-man switch: let go and the robot holds)
+    W S  A D  R F    move forward and back, left and right, up and down
+    J L  I K  U O    turn: roll, pitch, yaw
+    C V              close and open the gripper
+    T                move the torso in place of the gripper, and back
+    1 2 3 4          stance, right gripper, left gripper, lie down
+    Esc              stop: settle and lie down; twice: damp at once
   A gamepad works too: hold the right shoulder button.
   Ctrl-C here ends everything.
 ";
