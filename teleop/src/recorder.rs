@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
-use locoman_protocol::Wire;
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Event, OperatorCommand, RobotState, SimTruth, Tracking};
 use locoman_protocol::recording::{RecordingError, Writer};
+use locoman_protocol::{Received, Wire};
 
 /// Several seconds of everything.
 const QUEUE: usize = 2048;
@@ -21,9 +21,9 @@ const QUEUE: usize = 2048;
 #[derive(Debug)]
 #[expect(missing_docs, reason = "each is the message of that name")]
 pub enum Item {
-    Command(OperatorCommand),
-    State(RobotState),
-    Truth(SimTruth),
+    Command(Box<OperatorCommand>),
+    State(Arc<Received<RobotState>>),
+    Truth(Arc<Received<SimTruth>>),
     Tracking(Arc<Tracking>),
     Event(Event),
 }
@@ -93,9 +93,9 @@ fn write_all(
 ) -> Result<(), RecordingError> {
     while let Ok((time_ns, item)) = items.recv() {
         match item {
-            Item::Command(message) => write(&mut writer, time_ns, &message),
-            Item::State(message) => write(&mut writer, time_ns, &message),
-            Item::Truth(message) => write(&mut writer, time_ns, &message),
+            Item::Command(message) => write(&mut writer, time_ns, message.as_ref()),
+            Item::State(received) => write(&mut writer, time_ns, &received.message),
+            Item::Truth(received) => write(&mut writer, time_ns, &received.message),
             Item::Tracking(message) => write(&mut writer, time_ns, message.as_ref()),
             Item::Event(message) => write(&mut writer, time_ns, &message),
         }?;

@@ -133,11 +133,11 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    struct Script(std::vec::IntoIter<(usize, u64)>);
+    struct Script(std::slice::Iter<'static, (usize, u64)>);
 
     impl FrameSource for Script {
         fn next_frame(&mut self) -> Result<Option<Frame>, SourceError> {
-            let frame = |(camera, capture_ns)| Frame { camera, capture_ns, pixels: Pixels::Encoded(vec![]) };
+            let frame = |&(camera, capture_ns)| Frame { camera, capture_ns, pixels: Pixels::Encoded(vec![]) };
             Ok(self.0.next().map(frame))
         }
 
@@ -147,7 +147,7 @@ mod tests {
     }
 
     fn replay(frames: &'static [(usize, u64)], hold: &Arc<AtomicBool>) -> Replay {
-        let reopen: Reopen = Box::new(|| Ok(Box::new(Script(frames.to_vec().into_iter()))));
+        let reopen: Reopen = Box::new(|| Ok(Box::new(Script(frames.iter()))));
         Replay::open(reopen, 1000 * MS, Arc::clone(hold)).unwrap()
     }
 

@@ -202,13 +202,15 @@ fn listen(link: &Link, board: &Arc<Board>, tap: &Tap) -> Result<[Subscription; 2
                 latency.add(Stage::Link, m.command_received_ns.saturating_sub(sent_ns));
             }
         }
-        record.offer(Item::State(state.message.clone()));
-        *lock(&to.robot) = Some(Arc::new(state));
+        let state = Arc::new(state);
+        record.offer(Item::State(Arc::clone(&state)));
+        *lock(&to.robot) = Some(state);
     })?;
     let (to, record) = (Arc::clone(board), tap.clone());
     let truths = link.subscribe::<SimTruth>(move |truth| {
-        record.offer(Item::Truth(truth.message.clone()));
-        *lock(&to.truth) = Some(Arc::new(truth));
+        let truth = Arc::new(truth);
+        record.offer(Item::Truth(Arc::clone(&truth)));
+        *lock(&to.truth) = Some(truth);
     })?;
     Ok([states, truths])
 }

@@ -1,5 +1,7 @@
 //! The console in a real browser: the station's own program, a fake robot on a real Zenoh socket.
 
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a panic here is the report")]
+
 mod browser;
 
 use std::net::TcpListener;
@@ -42,7 +44,7 @@ impl FakeRobot {
         std::thread::spawn(move || {
             loop {
                 if talking.load(Ordering::Relaxed) {
-                    let command = last_for_state.lock().unwrap().clone();
+                    let command = *last_for_state.lock().unwrap();
                     let mode = if command.mode_request_id == 0 { Mode::Stance } else { command.mode() };
                     let state = RobotState {
                         mode: mode.into(),
@@ -63,7 +65,7 @@ impl FakeRobot {
     }
 
     fn command(&self) -> OperatorCommand {
-        self.last.lock().unwrap().clone()
+        *self.last.lock().unwrap()
     }
 }
 

@@ -66,16 +66,16 @@ impl Browser {
 
     fn attach(&mut self) {
         let target = until("a page", || {
-            let targets = self.call("Target.getTargets", json!({}));
+            let targets = self.call("Target.getTargets", &json!({}));
             let page = targets["targetInfos"].as_array()?.iter().find(|t| t["type"] == "page")?.clone();
             page["targetId"].as_str().map(str::to_owned)
         });
-        let attached = self.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
+        let attached = self.call("Target.attachToTarget", &json!({ "targetId": target, "flatten": true }));
         self.session = Some(attached["sessionId"].as_str().unwrap().to_owned());
     }
 
     /// Calls a method and waits for its result.
-    pub fn call(&mut self, method: &str, params: Value) -> Value {
+    pub fn call(&mut self, method: &str, params: &Value) -> Value {
         self.next_id += 1;
         let id = self.next_id;
         let mut call = json!({ "id": id, "method": method, "params": params });
@@ -96,7 +96,7 @@ impl Browser {
     /// The value of an expression in the page.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let result =
-            self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true }));
+            self.call("Runtime.evaluate", &json!({ "expression": expression, "returnByValue": true }));
         result["result"]["value"].clone()
     }
 
@@ -109,18 +109,18 @@ impl Browser {
         let at = self.evaluate(&rect);
         for kind in ["mousePressed", "mouseReleased"] {
             let event = json!({ "type": kind, "x": at[0], "y": at[1], "button": "left", "clickCount": 1 });
-            self.call("Input.dispatchMouseEvent", event);
+            self.call("Input.dispatchMouseEvent", &event);
         }
     }
 
     /// Presses (`keyDown`) or releases (`keyUp`) a key.
     pub fn key(&mut self, kind: &str, code: &str, key: &str) {
-        self.call("Input.dispatchKeyEvent", json!({ "type": kind, "code": code, "key": key }));
+        self.call("Input.dispatchKeyEvent", &json!({ "type": kind, "code": code, "key": key }));
     }
 
     /// A PNG of the window.
     pub fn screenshot(&mut self) -> Vec<u8> {
-        let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
+        let shot = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
         base64(shot["data"].as_str().unwrap())
     }
 }
