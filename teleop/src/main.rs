@@ -103,7 +103,7 @@ struct RunArgs {
     peer: Peer,
     /// With --replay: bring the robot into this mode and engage without a person; the recorded operator
     /// waits at the recording's begin until then
-    #[arg(long, value_name = "MODE", requires = "replay")]
+    #[arg(long, value_name = "MODE", conflicts_with_all = ["cameras", "joystick"])]
     auto_engage: Option<AutoMode>,
     /// Record the session
     #[arg(long, value_name = "FILE.mcap")]
