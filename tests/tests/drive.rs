@@ -35,7 +35,11 @@ fn standing(seen: &Seen) -> bool {
 }
 
 /// Waits while watching that the true gripper never jumps and the robot never falls.
-fn wait_without_a_jump(observer: &Observer, what: &str, mut holds: impl FnMut(&Seen) -> bool) {
+fn wait_without_a_jump(
+    observer: &Observer,
+    what: &str,
+    mut holds: impl FnMut(&Seen) -> bool,
+) -> anyhow::Result<()> {
     let mut last = true_gripper(&observer.seen());
     observer
         .wait_until(what, PATIENCE, |seen| {
@@ -47,7 +51,7 @@ fn wait_without_a_jump(observer: &Observer, what: &str, mut holds: impl FnMut(&S
             assert!(!seen.fallen, "{what}: the robot fell");
             holds(seen)
         })
-        .unwrap();
+        .map(drop)
 }
 
 /// How far the true gripper travels within a time.
@@ -75,7 +79,7 @@ fn images_move_the_robot_and_any_process_may_die() {
     for part in [Part::Simulator, Part::Robot, Part::Station] {
         system.start(part).unwrap();
     }
-    wait_without_a_jump(&observer, "the recorded operator is engaged", engaged);
+    wait_without_a_jump(&observer, "the recorded operator is engaged", engaged).unwrap();
     let moved_m = travel_m(&observer, Duration::from_secs(6));
     assert!(moved_m > 0.03, "the gripper follows the hand: it travelled {moved_m} m");
 
@@ -87,16 +91,16 @@ fn images_move_the_robot_and_any_process_may_die() {
         })
         .unwrap();
     assert!(noticed < NOTICE + SLACK, "noticed after {noticed:?}");
-    wait_without_a_jump(&observer, "the robot stands without an operator", standing);
+    wait_without_a_jump(&observer, "the robot stands without an operator", standing).unwrap();
     system.start(Part::Station).unwrap();
-    wait_without_a_jump(&observer, "a new station engages", engaged);
+    wait_without_a_jump(&observer, "a new station engages", engaged).unwrap();
 
     // The robot's controller dies: its motors hold the last command; a new one stands, then is engaged.
     system.kill(Part::Robot).unwrap();
     let held_m = travel_m(&observer, Duration::from_secs(1));
     assert!(held_m < 0.02, "the robot holds its pose: it travelled {held_m} m");
     system.start(Part::Robot).unwrap();
-    wait_without_a_jump(&observer, "a new controller stands and is engaged", engaged);
+    wait_without_a_jump(&observer, "a new controller stands and is engaged", engaged).unwrap();
 
     // The simulator dies: the robot says so at once, goes on running, and stands up the new one.
     system.kill(Part::Simulator).unwrap();

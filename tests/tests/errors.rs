@@ -16,16 +16,17 @@ fn error_of(output: &Output) -> String {
     text
 }
 
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> String {
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> std::io::Result<String> {
     let path = folder.join(name);
-    std::fs::write(&path, bytes).unwrap();
-    path.to_string_lossy().into_owned()
+    std::fs::write(&path, bytes)?;
+    Ok(path.to_string_lossy().into_owned())
 }
 
 #[test]
 fn a_damaged_recording_is_named_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
-    let recording = write(folder.path(), "damaged.mcap", b"\x89MCAP0\r\nand then nothing that makes sense");
+    let recording =
+        write(folder.path(), "damaged.mcap", b"\x89MCAP0\r\nand then nothing that makes sense").unwrap();
     let poses = folder.path().join("poses.csv");
     let output = finish(
         "locoman-teleop",
@@ -51,7 +52,8 @@ fn a_rig_file_with_a_typo_is_named_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let rig = std::fs::read_to_string(root().join("configs/rigs/two_zed_pairs.toml")).unwrap();
     let line = 1 + rig.lines().position(|line| line.starts_with("distortion")).unwrap();
-    let rig = write(folder.path(), "rig.toml", rig.replacen("distortion", "distorsion", 1).as_bytes());
+    let rig =
+        write(folder.path(), "rig.toml", rig.replacen("distortion", "distorsion", 1).as_bytes()).unwrap();
     let output = finish(
         "locoman-teleop",
         &["track", "x.mcap", "--rig", &rig, "--shells", "configs/shells/standard.toml", "-o", "x.csv"],
