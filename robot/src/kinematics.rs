@@ -2,10 +2,10 @@
 //!
 //! [`crate::dynamics`] computes the same in the world, with everything else; the estimator needs this before.
 
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use crate::{
-    joints::{JointVector, Leg},
+    joints::{JointVector, Leg, Side},
     model::{Frame, Model, PARENT},
 };
 
@@ -64,4 +64,35 @@ impl FootKinematics {
 /// The three numbers of a leg.
 pub fn of_leg(vector: &JointVector, leg: Leg) -> Vector3<f64> {
     vector.fixed_rows::<3>(leg.first_joint()).into_owned()
+}
+
+/// A gripper relative to the torso, moved by its leg's and its arm's joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GripperKinematics {
+    /// Pose of the gripper in the torso's frame.
+    pub torso_from_gripper: Isometry3<f64>,
+    /// Linear, then angular velocity of the gripper along the torso's axes, for the velocities of hip, thigh,
+    /// calf and the arm's three joints.
+    pub jacobian: Matrix6<f64>,
+    /// Which joints those are.
+    pub joints: [usize; 6],
+}
+
+impl GripperKinematics {
+    /// Kinematics of one side's gripper.
+    pub fn new(model: &Model, position: &JointVector, side: Side) -> Self {
+        let (leg, arm) = (side.leg().first_joint(), side.first_arm_joint());
+        let joints = [leg, leg + 1, leg + 2, arm, arm + 1, arm + 2];
+        let torso_from_gripper = torso_from_frame(model, position, Frame::Gripper(side));
+        let gripper = torso_from_gripper.translation.vector;
+        let mut jacobian = Matrix6::zeros();
+        for (column, joint) in joints.into_iter().enumerate() {
+            let body = torso_from_body(model, position, joint);
+            let axis = body.rotation * model.joints[joint].axis.into_inner();
+            let linear = axis.cross(&(gripper - body.translation.vector));
+            jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
+            jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
+        }
+        Self { torso_from_gripper, jacobian, joints }
+    }
 }

@@ -80,7 +80,12 @@ impl DrivenBody {
     }
 
     /// One control step. `permitted` takes a wanted target to the nearest one inside the limits.
-    pub fn advance(&mut self, now_ns: u64, dt_s: f64, permitted: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) {
+    pub fn advance(
+        &mut self,
+        now_ns: u64,
+        dt_s: f64,
+        mut permitted: impl FnMut(&Isometry3<f64>) -> Isometry3<f64>,
+    ) {
         if let Some(drive) = &self.drive {
             let now = drive.ramp.at_time(now_ns);
             let translation = now.translation.vector - drive.first.translation.vector;

@@ -124,7 +124,7 @@ impl Default for Limits {
         let gripper_torso = TorsoRange {
             x: Range::around_zero(0.06),
             y: Range::around_zero(0.06),
-            z: Range { min: -0.08, max: 0.06 },
+            z: Range { min: -0.08, max: 0.04 },
             roll: Range::around_zero(0.3),
             pitch: Range::around_zero(0.3),
             yaw: Range::around_zero(0.4),

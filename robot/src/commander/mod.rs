@@ -1,9 +1,9 @@
 //! From what the operator wants to what each body should do now.
 //!
 //! ```text
-//! Command ──► Engagement ──► DrivenBody: anchor ──► Ramp ──► Limits ──► PoseFollower ──► PoseReference
-//!             who moves it                within range,       within speed       pose, velocity,
-//!                                         over the feet       and acceleration   acceleration
+//! Command ──► Engagement ──► DrivenBody: anchor ──► Ramp ──► Limits, Reach ──► PoseFollower ──► PoseReference
+//!             who moves it                        within range and reach,  within speed     pose, velocity,
+//!                                                 over the feet            and acceleration acceleration
 //! ```
 
 mod body;
@@ -13,6 +13,7 @@ mod follower;
 mod limits;
 mod quintic;
 mod ramp;
+mod reach;
 mod reference;
 mod support;
 
@@ -23,5 +24,6 @@ pub use follower::PoseFollower;
 pub use limits::{GripperRange, Limits, Range, RateLimits, TorsoRange};
 pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
+pub use reach::Reach;
 pub use reference::{PoseReference, rebased_point};
 pub use support::{from_above, push_inside};

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     commander::{
-        Command, DrivenBody, Grip, Limits, PointMotion, PoseMotion, PoseReference, RateLimits, SampleClock,
-        from_above, push_inside,
+        Command, DrivenBody, Grip, Limits, PointMotion, PoseMotion, PoseReference, RateLimits, Reach,
+        SampleClock, from_above, push_inside,
     },
     dynamics::State,
     estimator::heading,
@@ -78,6 +78,7 @@ pub struct Choreography {
     torso: DrivenBody,
     gripper: DrivenBody,
     gripper_start: Vector3<f64>,
+    reach: Reach,
     opening: [f64; 2],
     opening_goal: [f64; 2],
     touched_ns: Option<u64>,
@@ -139,6 +140,7 @@ impl Choreography {
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
             gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
             gripper_start: Vector3::zeros(),
+            reach: Reach::new(Side::Right, &stand),
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             touched_ns: None,
@@ -234,7 +236,7 @@ impl Choreography {
                 let foot = self.foot_reference(side, scene);
                 let up = foot.position + Vector3::z() * self.rise(&foot, side, scene);
                 self.foot_motion = PointMotion::new(&foot, &up, self.motions.lift_s);
-                let ready = self.poses.ready_rad;
+                let ready = self.poses.ready(side);
                 self.move_arm(side, &ready, self.motions.arm_s);
             }
             Phase::SingleGripper(side) => {
@@ -416,10 +418,12 @@ impl Choreography {
             let outward = if side == Side::Left { 1.0 } else { -1.0 };
             let (limits, start) = (self.limits.gripper, self.gripper_start);
             let lowest = self.lowest_gripper(side, scene);
+            let (reach, world_from_torso) = (&mut self.reach, self.setpoint.torso.pose());
             self.gripper.advance(scene.now_ns, scene.dt_s, |wanted| {
                 let mut position = limits.clamp(&wanted.translation.vector, &start, outward);
                 position.z = position.z.max(lowest);
-                Isometry3::from_parts(position.into(), wanted.rotation)
+                let inside = Isometry3::from_parts(position.into(), wanted.rotation);
+                world_from_torso * reach.nearest(scene.model, &world_from_torso.inv_mul(&inside))
             });
             self.setpoint.arms[side.index()] = ArmGoal::Gripper(*self.gripper.reference());
         }
@@ -477,6 +481,7 @@ impl Choreography {
         let rate = self.limits.gripper_rate;
         self.gripper = DrivenBody::new(PoseReference::hold(&pose), self.limits.follower_rad_s, rate);
         self.gripper_start = pose.translation.vector;
+        self.reach = Reach::new(side, scene.desired);
         self.setpoint.arms[side.index()] = ArmGoal::Gripper(PoseReference::hold(&pose));
     }
 

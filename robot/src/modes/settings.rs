@@ -15,8 +15,8 @@ pub struct PoseSettings {
     pub fold_rad: Vector3<f64>,
     /// The left arm folded up along its calf, rad; the right one has joint 2 mirrored.
     pub left_stow_rad: Vector3<f64>,
-    /// An arm ready for use, rad.
-    pub ready_rad: Vector3<f64>,
+    /// The left arm ready for use, rad; the right one has joint 2 mirrored.
+    pub left_ready_rad: Vector3<f64>,
     /// Torso's origin above the feet's centres in stance, m.
     pub stand_height_m: f64,
     /// Shift of the torso before the right foot lifts (y mirrored for the left), m.
@@ -33,9 +33,9 @@ impl Default for PoseSettings {
             stand_rad: Vector3::new(0.0, 0.9, -1.8),
             fold_rad: Vector3::new(0.0, 1.39, -2.78),
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
-            ready_rad: Vector3::new(-std::f64::consts::FRAC_PI_8, 0.0, 0.0),
+            left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
             stand_height_m: 0.265,
-            right_shift_m: Vector3::new(-0.05, 0.03, 0.02),
+            right_shift_m: Vector3::new(-0.05, 0.03, 0.04),
             lift_m: 0.12,
             hover_m: 0.05,
         }
@@ -45,11 +45,12 @@ impl Default for PoseSettings {
 impl PoseSettings {
     /// The folded posture of an arm.
     pub fn stow(&self, side: Side) -> Vector3<f64> {
-        let [x, y, z] = self.left_stow_rad.into();
-        match side {
-            Side::Left => Vector3::new(x, y, z),
-            Side::Right => Vector3::new(x, -y, z),
-        }
+        mirrored(&self.left_stow_rad, side)
+    }
+
+    /// The posture of an arm ready for use.
+    pub fn ready(&self, side: Side) -> Vector3<f64> {
+        mirrored(&self.left_ready_rad, side)
     }
 
     /// Shift of the torso before a foot lifts.
@@ -71,6 +72,14 @@ impl PoseSettings {
             posture.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from(&self.stow(side));
         }
         posture
+    }
+}
+
+/// Angles of a left arm, for either side.
+fn mirrored(left: &Vector3<f64>, side: Side) -> Vector3<f64> {
+    match side {
+        Side::Left => *left,
+        Side::Right => Vector3::new(left.x, -left.y, left.z),
     }
 }
 
