@@ -61,6 +61,33 @@ impl FootKinematics {
     }
 }
 
+/// Joint angles that bring a foot to a point in the torso's frame, or as near as the joints' ranges allow.
+///
+/// Damped Gauss-Newton steps from `start`, within the model's ranges; for the set-up of motions, not for the
+/// control of forces. Allocates nothing.
+pub fn leg_towards(
+    model: &Model,
+    start: &JointVector,
+    leg: Leg,
+    foot_in_torso: &Vector3<f64>,
+) -> Vector3<f64> {
+    const STEPS: usize = 40;
+    const DAMPING: f64 = 1e-5;
+    let mut joints = *start;
+    for _ in 0..STEPS {
+        let foot = FootKinematics::new(model, &joints, leg);
+        let error = foot_in_torso - foot.position();
+        let hessian = foot.linear.tr_mul(&foot.linear) + DAMPING * Matrix3::identity();
+        let step = hessian.cholesky().map_or_else(Vector3::zeros, |f| f.solve(&foot.linear.tr_mul(&error)));
+        for column in 0..3 {
+            let joint = leg.first_joint() + column;
+            let angle = joints[joint] + step[column].clamp(-0.2, 0.2);
+            joints[joint] = angle.max(model.lower[joint]).min(model.upper[joint]);
+        }
+    }
+    of_leg(&joints, leg)
+}
+
 /// The three numbers of a leg.
 pub fn of_leg(vector: &JointVector, leg: Leg) -> Vector3<f64> {
     vector.fixed_rows::<3>(leg.first_joint()).into_owned()

@@ -18,7 +18,8 @@ impl Range {
         Self { min: -half, max: half }
     }
 
-    fn clamp(&self, value: f64) -> f64 {
+    /// The nearest value inside.
+    pub fn clamp(&self, value: f64) -> f64 {
         value.max(self.min).min(self.max)
     }
 }
@@ -91,6 +92,20 @@ impl GripperRange {
     }
 }
 
+/// Joint angles within which leg and arm reach for a gripper's target.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReachRange {
+    /// rad.
+    pub hip: Range,
+    /// rad.
+    pub thigh: Range,
+    /// rad.
+    pub calf: Range,
+    /// The arm's first joint, rad; the others have the model's range.
+    pub arm_1: Range,
+}
+
 /// Everything in `limits.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,6 +116,8 @@ pub struct Limits {
     pub gripper_torso: TorsoRange,
     /// Gripper.
     pub gripper: GripperRange,
+    /// Joints behind a gripper.
+    pub reach: ReachRange,
     /// How fast the torso's target moves on four feet.
     pub stance_torso_rate: RateLimits,
     /// How fast the torso's target moves while a gripper is used.
@@ -136,6 +153,12 @@ impl Default for Limits {
                 x: Range { min: -0.2, max: 0.22 },
                 outward: Range { min: -0.15, max: 0.22 },
                 z: Range { min: -0.15, max: 0.3 },
+            },
+            reach: ReachRange {
+                hip: Range::around_zero(0.83),
+                thigh: Range { min: -0.4, max: 2.2 },
+                calf: Range { min: -2.78, max: -0.95 },
+                arm_1: Range { min: -2.2, max: 1.7 },
             },
             stance_torso_rate: RateLimits {
                 speed_m_s: 0.3,

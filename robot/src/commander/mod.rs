@@ -21,7 +21,7 @@ pub use body::DrivenBody;
 pub use command::{Command, EngagementId, RequestId};
 pub use engagement::{Engagement, Grip};
 pub use follower::PoseFollower;
-pub use limits::{GripperRange, Limits, Range, RateLimits, TorsoRange};
+pub use limits::{GripperRange, Limits, Range, RateLimits, ReachRange, TorsoRange};
 pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
 pub use reach::Reach;

@@ -8,6 +8,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
+use super::limits::{Range, ReachRange};
 use crate::{
     joints::{JointVector, Side},
     kinematics::GripperKinematics,
@@ -30,12 +31,23 @@ const STEPS: usize = 3;
 pub struct Reach {
     side: Side,
     joints: JointVector,
+    range: ReachRange,
 }
 
 impl Reach {
     /// Starts at these joint angles.
-    pub fn new(side: Side, joints: &JointVector) -> Self {
-        Self { side, joints: *joints }
+    pub fn new(side: Side, joints: &JointVector, range: ReachRange) -> Self {
+        Self { side, joints: *joints, range }
+    }
+
+    fn range(&self, model: &Model, column: usize, joint: usize) -> Range {
+        match column {
+            0 => self.range.hip,
+            1 => self.range.thigh,
+            2 => self.range.calf,
+            3 => self.range.arm_1,
+            _ => Range { min: model.lower[joint] + MARGIN_RAD, max: model.upper[joint] - MARGIN_RAD },
+        }
     }
 
     /// The nearest pose to `torso_from_target` that can be reached. Allocates nothing.
@@ -64,9 +76,10 @@ impl Reach {
             let step = solve_free(&hessian, &gradient, &held);
             let mut again = false;
             for (column, joint) in now.joints.into_iter().enumerate() {
-                let (lower, upper) = (model.lower[joint] + MARGIN_RAD, model.upper[joint] - MARGIN_RAD);
+                let range = self.range(model, column, joint);
                 let angle = self.joints[joint];
-                let leaves = (angle <= lower && step[column] < 0.0) || (angle >= upper && step[column] > 0.0);
+                let leaves =
+                    (angle <= range.min && step[column] < 0.0) || (angle >= range.max && step[column] > 0.0);
                 if leaves && !held[column] {
                     held[column] = true;
                     again = true;
@@ -75,9 +88,9 @@ impl Reach {
             if !again {
                 let scale = (MAX_STEP_RAD / step.amax().max(MAX_STEP_RAD)).min(1.0);
                 for (column, joint) in now.joints.into_iter().enumerate() {
-                    let (lower, upper) = (model.lower[joint] + MARGIN_RAD, model.upper[joint] - MARGIN_RAD);
+                    let range = self.range(model, column, joint);
                     let angle = self.joints[joint] + scale * step[column];
-                    self.joints[joint] = angle.max(lower).min(upper);
+                    self.joints[joint] = range.clamp(angle);
                 }
                 return;
             }
@@ -105,7 +118,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{kinematics::torso_from_frame, model::Frame};
+    use crate::{commander::Limits, kinematics::torso_from_frame, model::Frame};
 
     fn model() -> Model {
         Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
@@ -143,7 +156,7 @@ mod tests {
             }
             let pose = |joints| torso_from_frame(&model, joints, Frame::Gripper(Side::Right));
             let goal = pose(&there);
-            let mut sut = Reach::new(Side::Right, &ready);
+            let mut sut = Reach::new(Side::Right, &ready, Limits::default().reach);
             let reached = walk(&mut sut, &model, &pose(&ready), &goal);
             prop_assert!((reached.translation.vector - goal.translation.vector).norm() < 1e-4);
             prop_assert!(reached.rotation.angle_to(&goal.rotation) < 1e-3);
@@ -159,7 +172,7 @@ mod tests {
                 (start.translation.vector + Vector3::from(far)).into(),
                 UnitQuaternion::from_scaled_axis(turn.into()) * start.rotation,
             );
-            let mut sut = Reach::new(Side::Right, &ready);
+            let mut sut = Reach::new(Side::Right, &ready, Limits::default().reach);
             let reached = walk(&mut sut, &model, &start, &goal);
             prop_assert!((reached.translation.vector - goal.translation.vector).norm() < 0.45);
             let back = walk(&mut sut, &model, &goal, &start);

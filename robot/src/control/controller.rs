@@ -255,6 +255,7 @@ impl Controller {
             stop: self.stop,
             unloaded_ns: self.unloaded_ns,
             control_fault: self.machine.phase().is_balanced() && self.output.status.fault.is_some(),
+            no_ground: self.progress.no_ground,
         }
     }
 

@@ -18,7 +18,7 @@ use crate::{
     dynamics::State,
     estimator::heading,
     joints::{JointVector, Leg, Side},
-    kinematics::torso_from_frame,
+    kinematics::{leg_towards, torso_from_frame},
     model::{Frame, Model},
     wbc::PointReference,
 };
@@ -60,6 +60,8 @@ pub struct Progress {
     pub arrived: bool,
     /// The foot that lifts is off the ground.
     pub airborne: bool,
+    /// The foot has gone as deep as it may, and felt no ground.
+    pub no_ground: bool,
 }
 
 /// The motions of the phase that is on.
@@ -75,6 +77,7 @@ pub struct Choreography {
     torso_motion: PoseMotion,
     arm_motions: [PointMotion; 2],
     foot_motion: PointMotion,
+    leg_motion: PointMotion,
     torso: DrivenBody,
     gripper: DrivenBody,
     gripper_start: Vector3<f64>,
@@ -137,10 +140,11 @@ impl Choreography {
             torso_motion: PoseMotion::new(&still, &identity, 1.0),
             arm_motions: Side::ALL.map(|side| PointMotion::hold(poses.stow(side))),
             foot_motion: PointMotion::hold(Vector3::zeros()),
+            leg_motion: PointMotion::hold(poses.stand_rad),
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
             gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
             gripper_start: Vector3::zeros(),
-            reach: Reach::new(Side::Right, &stand),
+            reach: Reach::new(Side::Right, &stand, limits.reach),
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             touched_ns: None,
@@ -247,8 +251,7 @@ impl Choreography {
                 self.move_torso(&Isometry3::identity());
                 self.begin_arm(side, scene);
                 let foot = self.foot_reference(side, scene);
-                let hover = landing(side, scene) + Vector3::z() * self.poses.hover_m;
-                self.foot_motion = PointMotion::new(&foot, &hover, self.motions.arm_s);
+                self.begin_leg(side, &foot, scene);
                 self.move_arm(side, &self.poses.stow(side), self.motions.arm_s);
             }
             Phase::LowerFoot(side) => {
@@ -293,11 +296,12 @@ impl Choreography {
             Phase::LiftFoot(side) => self.lift(side, elapsed_s, load_step),
             Phase::SingleGripper(side) => {
                 self.drive(Some(side), scene, command, fresh, clock);
-                Progress { arrived: true, airborne: true }
+                Progress { arrived: true, airborne: true, no_ground: false }
             }
             Phase::Stow(side) => {
                 self.play_lifted(side, elapsed_s, elapsed_s);
-                Progress { arrived: elapsed_s >= self.motions.arm_s, airborne: true }
+                self.fold_leg(side, elapsed_s, scene);
+                Progress { arrived: elapsed_s >= self.motions.arm_s, airborne: true, no_ground: false }
             }
             Phase::LowerFoot(side) => self.lower(side, elapsed_s, load_step, scene),
         }
@@ -317,7 +321,7 @@ impl Choreography {
             self.play_lifted(side, lifting_s, lifting_s - 0.4 * self.motions.lift_s);
         }
         let duration_s = self.motions.load_s + 0.4 * self.motions.lift_s + self.motions.arm_s;
-        Progress { arrived: airborne && elapsed_s >= duration_s, airborne }
+        Progress { arrived: airborne && elapsed_s >= duration_s, airborne, no_ground: false }
     }
 
     /// Lowers the foot until it feels the ground, then loads it.
@@ -327,7 +331,7 @@ impl Choreography {
             self.play_lifted(side, elapsed_s, elapsed_s);
             let felt = scene.foot_force[leg.index()] > self.motions.touch_n;
             self.touching = if felt { self.touching + 1 } else { 0 };
-            if self.touching >= TOUCH_SAMPLES || elapsed_s >= self.foot_motion.duration_s() {
+            if self.touching >= TOUCH_SAMPLES {
                 self.touched_ns = Some(scene.now_ns);
                 let posture = PointReference::hold(self.poses.stow(side));
                 self.setpoint.arms[side.index()] = ArmGoal::Posture(posture);
@@ -337,7 +341,8 @@ impl Choreography {
             self.setpoint.load(leg, 1.0, load_step);
         }
         let share = self.setpoint.contacts.share(leg);
-        Progress { arrived: share >= 1.0, airborne: share <= 0.0 }
+        let searched = self.touched_ns.is_none() && elapsed_s >= self.foot_motion.duration_s();
+        Progress { arrived: share >= 1.0, airborne: share <= 0.0, no_ground: searched }
     }
 
     /// Torso and arms on their motions, four feet on the ground.
@@ -429,6 +434,47 @@ impl Choreography {
         }
     }
 
+    /// Begins the way of a lifted leg to above its landing point, in the space of its joints: on a straight
+    /// line in the world, a leg that an operator has led far around would meet the ends of its ranges.
+    fn begin_leg(&mut self, side: Side, foot: &PointReference, scene: &Scene<'_>) {
+        let leg = side.leg();
+        let joints = |vector: &JointVector| vector.fixed_rows::<3>(leg.first_joint()).into_owned();
+        let hover = landing(side, scene) + Vector3::z() * self.poses.hover_m;
+        // The torso arrives at the world's origin together with the foot.
+        let stand = self.poses.posture(&self.poses.stand_rad);
+        let goal = leg_towards(scene.model, &stand, leg, &hover);
+        let start = PointReference::hold(joints(scene.desired));
+        self.leg_motion = PointMotion::new(&start, &goal, self.motions.arm_s);
+        // What the reference is off the desired joints' place fades out on the way.
+        let torso_from_foot = torso_from_frame(scene.model, scene.desired, Frame::Foot(leg));
+        let offset = foot.position - (self.setpoint.torso.pose() * torso_from_foot).translation.vector;
+        let start = PointReference { position: offset, ..PointReference::hold(offset) };
+        self.foot_motion = PointMotion::new(&start, &Vector3::zeros(), self.motions.arm_s);
+    }
+
+    /// The foot's reference while its leg folds.
+    fn fold_leg(&mut self, side: Side, elapsed_s: f64, scene: &Scene<'_>) {
+        let leg = side.leg();
+        let place = |at_s: f64| {
+            let mut joints = *scene.desired;
+            joints.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&self.leg_motion.sample(at_s).position);
+            let torso = self.torso_motion.sample(at_s).pose();
+            let foot = torso * torso_from_frame(scene.model, &joints, Frame::Foot(leg));
+            foot.translation.vector + self.foot_motion.sample(at_s).position
+        };
+        /// Half the interval of the central differences, s.
+        const STEP_S: f64 = 1e-3;
+        let (before, now, after) =
+            (place((elapsed_s - STEP_S).max(0.0)), place(elapsed_s), place(elapsed_s + STEP_S));
+        let foot = PointReference {
+            position: now,
+            velocity: (after - before) / (2.0 * STEP_S),
+            acceleration: (after - 2.0 * now + before) / (STEP_S * STEP_S),
+        };
+        let posture = self.arm_motions[side.index()].sample(elapsed_s);
+        self.setpoint.arms[side.index()] = ArmGoal::PostureAndFoot(posture, foot);
+    }
+
     /// Lowest height of a gripper's target at which neither it nor the foot behind it touches the ground.
     ///
     /// Leg and arm have just six joints, so gripper and foot rise and fall together: what room both have left
@@ -481,7 +527,7 @@ impl Choreography {
         let rate = self.limits.gripper_rate;
         self.gripper = DrivenBody::new(PoseReference::hold(&pose), self.limits.follower_rad_s, rate);
         self.gripper_start = pose.translation.vector;
-        self.reach = Reach::new(side, scene.desired);
+        self.reach = Reach::new(side, scene.desired, self.limits.reach);
         self.setpoint.arms[side.index()] = ArmGoal::Gripper(PoseReference::hold(&pose));
     }
 
@@ -554,5 +600,5 @@ fn landing(side: Side, scene: &Scene<'_>) -> Vector3<f64> {
 }
 
 fn arrived(arrived: bool) -> Progress {
-    Progress { arrived, airborne: false }
+    Progress { arrived, ..Progress::default() }
 }

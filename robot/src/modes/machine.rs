@@ -199,6 +199,7 @@ impl Machine {
                 }
             }
             Phase::LowerFoot(_) if inputs.arrived => Phase::Recentre,
+            Phase::LowerFoot(side) if inputs.airborne && side_wanted == Some(side) => Phase::LiftFoot(side),
             Phase::LieDown if !lowers => self.turn_back(Mode::LieDown, Phase::StandUp),
             Phase::LieDown if inputs.arrived => {
                 self.mode = self.goal;

@@ -53,6 +53,8 @@ pub struct Flags {
     pub unloaded_ns: u64,
     /// The whole-body controller reported a fault.
     pub control_fault: bool,
+    /// A foot that goes down finds no ground.
+    pub no_ground: bool,
 }
 
 /// What must happen, and why.
@@ -122,6 +124,9 @@ fn judge_robot(thresholds: &Thresholds, flags: &Flags, verdict: &mut Assessment)
     if ms(flags.unloaded_ns) >= thresholds.foot_unloaded_ms {
         verdict.raise(Severity::Warn, Reason::FootUnloaded);
     }
+    if flags.no_ground {
+        verdict.raise(Severity::Warn, Reason::NoGround);
+    }
     if flags.control_fault {
         verdict.raise(Severity::Disengage, Reason::Control);
     }
@@ -148,6 +153,7 @@ mod tests {
             stop: Stop::None,
             unloaded_ns: 0,
             control_fault: false,
+            no_ground: false,
         }
     }
 

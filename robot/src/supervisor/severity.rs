@@ -49,11 +49,13 @@ pub enum Reason {
     FootUnloaded,
     /// The whole-body controller gave up.
     Control,
+    /// A foot that goes down finds no ground.
+    NoGround,
 }
 
 impl Reason {
     /// All of them, in order.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::NoOperator,
         Self::CommandLate,
         Self::CommandLost,
@@ -67,6 +69,7 @@ impl Reason {
         Self::StopDamp,
         Self::FootUnloaded,
         Self::Control,
+        Self::NoGround,
     ];
 
     /// For people.
@@ -85,6 +88,7 @@ impl Reason {
             Self::StopDamp => "stopped: damped",
             Self::FootUnloaded => "a foot that should stand carries nothing",
             Self::Control => "the whole-body controller found no forces",
+            Self::NoGround => "the foot finds no ground: still on three feet",
         }
     }
 }
