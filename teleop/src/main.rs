@@ -85,9 +85,9 @@ struct OperatorArgs {
     /// Replay a recording, over and over: an MCAP file or a folder of images
     #[arg(long, value_name = "REC")]
     replay: Option<PathBuf>,
-    /// Track the operator with the cameras of the rig
-    #[arg(long)]
-    cameras: bool,
+    /// Track the operator with the cameras of this rig file
+    #[arg(long, value_name = "RIG")]
+    cameras: Option<PathBuf>,
     /// Track nobody: joystick and console only
     #[arg(long)]
     joystick: bool,
@@ -237,10 +237,11 @@ fn obey(cli: Cli) -> Result<()> {
 
 fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {
     let OperatorArgs { replay, cameras, .. } = args.operator;
-    let operator = match replay {
-        Some(path) => Operator::Replay(path),
-        None if cameras => Operator::Cameras,
-        None => Operator::Joystick,
+    let rig = cameras.clone().unwrap_or_else(|| args.files.rig(&configs));
+    let operator = match (replay, cameras) {
+        (Some(path), _) => Operator::Replay(path),
+        (None, Some(_)) => Operator::Cameras,
+        (None, None) => Operator::Joystick,
     };
     let (interrupt, interrupted) = mpsc::channel();
     ctrlc::set_handler(move || {
@@ -248,7 +249,7 @@ fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {
         let _ = interrupt.send(());
     })?;
     let options = Options {
-        rig: args.files.rig(&configs),
+        rig,
         shells: args.files.shells(&configs),
         configs,
         operator,

@@ -64,7 +64,8 @@ fn run(command: Command) -> Result<()> {
         Command::Eval(args) => eval(&args),
         Command::Bench => {
             setup::ensure(setup::Purpose::Run)?;
-            shell::cargo(&["bench", "--package", "locoman-robot"])
+            // The one profile of this workspace: see the root Cargo.toml.
+            shell::cargo(&["bench", "--profile", "dev", "--workspace", "--bench", "wbc"])
         }
     }
 }
