@@ -5,6 +5,7 @@
 mod session;
 
 use locoman_robot::{
+    control::Inputs,
     joints::Side,
     modes::{Mode, Phase, Refusal},
     plant::{JointCommand, Plant},
@@ -62,7 +63,7 @@ fn r_safe_005_a_simulator_that_returns_is_met_anew() {
     for posture in ["lying", "standing"] {
         let mut sut = in_gripper(Side::Left);
         let start_ns = sut.time_ns;
-        let inputs = locoman_robot::control::Inputs::default();
+        let inputs = Inputs::default();
         for silent_ms in (20..1_000).step_by(20) {
             let silent_ns = silent_ms * 1_000_000;
             sut.command = sut.controller.silent(start_ns + silent_ns, silent_ns, &inputs);
@@ -163,6 +164,24 @@ fn a_mind_changed_at_any_instant_ends_on_four_feet() {
         assert!(sut.truth.foot_force_n.iter().all(|force| *force > 15.0), "after {tenths} tenths");
         assert!(sut.worst_tilt < 0.15, "after {tenths} tenths: {}", sut.worst_tilt);
     }
+}
+
+#[test]
+fn r_safe_017_a_foot_that_feels_no_ground_takes_no_load() {
+    let mut sut = in_gripper(Side::Right);
+    sut.operator().mode = Some(Mode::Stance);
+    sut.operator().mode_request += 1;
+    for _ in 0..(10.0 * 400.0) as usize {
+        let mut sensors = sut.plant.exchange(&sut.command).unwrap();
+        sensors.foot_force[0] = 0.0;
+        sut.operator().received_ns = sensors.time_ns;
+        sut.operator().sequence += 1;
+        let inputs = Inputs { command: sut.operator, ..Inputs::default() };
+        sut.command = sut.controller.tick(sensors.time_ns, &sensors, &inputs);
+    }
+    assert_eq!(sut.snapshot().phase, Phase::LowerFoot(Side::Right));
+    assert!(sut.snapshot().assessment.reasons.contains(Reason::NoGround));
+    sut.run_until("four feet", 5.0, |s| s.phase == Phase::Stance);
 }
 
 /// Targets that jump all over, far beyond reach, four times a second.

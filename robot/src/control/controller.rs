@@ -1,24 +1,20 @@
 //! One control step.
 
-use nalgebra::Isometry3;
-
 use super::{
     posture,
     requests::RequestLog,
     settings::RobotConfig,
-    snapshot::{BodyState, CommandTrace, Snapshot},
+    snapshot::{CommandTrace, Snapshot},
     timing::Percentiles,
 };
 use crate::{
-    commander::{Command, Engagement, Grip, SampleClock},
+    commander::{Command, Engagement, SampleClock},
     dynamics::State,
     estimator::{KinematicEstimator, tilt_angle},
-    joints::{JointVector, Leg, Side},
-    kinematics::torso_from_frame,
-    model::Frame,
+    joints::JointVector,
     modes::{self, Choreography, JointGains, Machine, Mode, Phase, Progress, Refusal, Scene, Start},
     plant::{JointCommand, Sensors},
-    supervisor::{Assessment, Flags, SensorHealth, Severity, Stop, assess},
+    supervisor::{Assessment, SensorHealth, Stop, assess},
     wbc::{ContactSet, WbcOutput, WholeBodyController},
 };
 
@@ -45,31 +41,31 @@ pub struct Inputs {
 
 /// The controller.
 pub struct Controller {
-    config: RobotConfig,
-    options: Options,
-    estimator: KinematicEstimator,
-    machine: Machine,
-    choreography: Choreography,
-    wbc: WholeBodyController,
-    output: WbcOutput,
-    engagement: Engagement,
-    requests: RequestLog,
-    clock: SampleClock,
-    stop: Stop,
-    refusal: Option<Refusal>,
+    pub(super) config: RobotConfig,
+    pub(super) options: Options,
+    pub(super) estimator: KinematicEstimator,
+    pub(super) machine: Machine,
+    pub(super) choreography: Choreography,
+    pub(super) wbc: WholeBodyController,
+    pub(super) output: WbcOutput,
+    pub(super) engagement: Engagement,
+    pub(super) requests: RequestLog,
+    pub(super) clock: SampleClock,
+    pub(super) stop: Stop,
+    pub(super) refusal: Option<Refusal>,
     /// Joint positions of the last command.
-    desired: JointVector,
+    pub(super) desired: JointVector,
     /// The last command.
-    command: JointCommand,
-    trace: CommandTrace,
-    progress: Progress,
-    unloaded_ns: u64,
-    sample_ns: Option<u64>,
-    lost: bool,
-    stood: bool,
+    pub(super) command: JointCommand,
+    pub(super) trace: CommandTrace,
+    pub(super) progress: Progress,
+    pub(super) unloaded_ns: u64,
+    pub(super) sample_ns: Option<u64>,
+    pub(super) lost: bool,
+    pub(super) stood: bool,
     /// Bounded by the last step: [`STEP_RANGE_S`].
-    dt_s: f64,
-    snapshot: Snapshot,
+    pub(super) dt_s: f64,
+    pub(super) snapshot: Snapshot,
 }
 
 impl Controller {
@@ -98,7 +94,7 @@ impl Controller {
             lost: true,
             stood: false,
             dt_s: STEP_RANGE_S.0,
-            snapshot: nothing_known(),
+            snapshot: Snapshot::nothing_known(),
             config,
             options,
         }
@@ -146,8 +142,9 @@ impl Controller {
 
         let state = self.estimator.state(sensors);
         let scene = scene(&self.config, &state, &self.desired, &self.wbc, sensors, now_ns, self.dt_s);
-        let operator = inputs.command.as_ref().zip(grip);
-        self.progress = self.choreography.step(&scene, operator, fresh, &self.clock);
+        let operator =
+            modes::Operator { command: inputs.command.as_ref().zip(grip), fresh, clock: &self.clock };
+        self.progress = self.choreography.step(&scene, &operator);
         self.command = self.act(now_ns, &state);
         self.desired = self.command_positions(sensors);
         self.report(sensors, &state, assessment);
@@ -220,65 +217,6 @@ impl Controller {
         let scene = scene(&self.config, &state, &self.desired, &self.wbc, sensors, now_ns, self.dt_s);
         self.choreography.take_up(&scene, lifted);
         self.choreography.enter(self.machine.phase(), &scene);
-    }
-
-    fn latch(&mut self, stop: Stop) {
-        self.stop = self.stop.max(stop);
-    }
-
-    /// Takes in the latest command: whether it is new, and what it means.
-    fn listen(&mut self, now_ns: u64, inputs: &Inputs) -> (bool, Option<Grip>) {
-        let Some(command) = &inputs.command else { return (false, None) };
-        let fresh = (command.source, command.sequence) != (self.trace.source, self.trace.sequence);
-        if fresh {
-            self.clock.tick(command.received_ns);
-            self.trace = CommandTrace {
-                source: command.source,
-                sequence: command.sequence,
-                capture_ns: command.capture_ns,
-                received_ns: command.received_ns,
-                applied_ns: now_ns,
-            };
-        }
-        let driven = self.machine.phase().is_driven();
-        let permitted = driven && self.snapshot.assessment.severity < Severity::Hold;
-        (fresh, Some(self.engagement.update(command, permitted)))
-    }
-
-    fn flags(&self, now_ns: u64, tilt_rad: f64, sensors: SensorHealth, inputs: &Inputs) -> Flags {
-        Flags {
-            now_ns,
-            command_ns: inputs.command.as_ref().map(|command| command.received_ns),
-            manipulating: self.machine.phase().is_manipulating(),
-            sensors,
-            tilt_rad,
-            stop: self.stop,
-            unloaded_ns: self.unloaded_ns,
-            control_fault: self.machine.phase().is_balanced() && self.output.status.fault.is_some(),
-            no_ground: self.progress.no_ground,
-        }
-    }
-
-    fn assess(
-        &mut self,
-        now_ns: u64,
-        sensors: &Sensors,
-        health: SensorHealth,
-        inputs: &Inputs,
-    ) -> Assessment {
-        let threshold = self.config.thresholds.foot_unloaded_n;
-        let contacts = &self.choreography.setpoint().contacts;
-        let floating = Leg::ALL
-            .into_iter()
-            .any(|leg| contacts.share(leg) >= 1.0 && sensors.foot_force[leg.index()] < threshold);
-        let counts = floating && self.machine.phase().is_balanced();
-        self.unloaded_ns = if counts { self.unloaded_ns + (self.dt_s * 1e9) as u64 } else { 0 };
-        let flags = self.flags(now_ns, tilt_angle(&sensors.attitude), health, inputs);
-        let assessment = assess(&self.config.thresholds, &flags);
-        if assessment.severity >= Severity::Disengage {
-            self.engagement.end(inputs.command.as_ref());
-        }
-        assessment
     }
 
     /// Runs the state machine, and begins what it decides.
@@ -380,46 +318,6 @@ impl Controller {
     fn command_positions(&self, sensors: &Sensors) -> JointVector {
         if self.machine.phase() == Phase::Damped { sensors.position } else { self.command.position }
     }
-
-    fn report(&mut self, sensors: &Sensors, state: &State, assessment: Assessment) {
-        let setpoint = self.choreography.setpoint();
-        let balanced = self.machine.phase().is_balanced();
-        let torso = state.world_from_torso;
-        let torso_target = if balanced { setpoint.torso.pose() } else { torso };
-        let gripper = |side: Side| {
-            let frame = Frame::Gripper(side);
-            let pose = torso * torso_from_frame(&self.config.model, &sensors.position, frame);
-            let target = match setpoint.gripper(side) {
-                Some(reference) if balanced => reference.pose(),
-                _ if balanced => torso_target * torso_from_frame(&self.config.model, &self.desired, frame),
-                _ => pose,
-            };
-            BodyState { pose, target }
-        };
-        let holding = assessment.severity >= Severity::Hold;
-        self.snapshot = Snapshot {
-            time_ns: sensors.time_ns,
-            mode: self.machine.mode(),
-            phase: self.machine.phase(),
-            goal: self.machine.goal(),
-            acknowledged_request: self.requests.acknowledged(),
-            refusal: self.refusal,
-            engagement: if holding { 0 } else { self.engagement.number() },
-            assessment,
-            joint_position: sensors.position,
-            joint_velocity: sensors.velocity,
-            joint_torque: sensors.torque,
-            opening: sensors.opening,
-            foot_force: sensors.foot_force,
-            world_resets: self.estimator.resets(),
-            torso: BodyState { pose: torso, target: torso_target },
-            grippers: Side::ALL.map(gripper),
-            command: self.trace,
-            period: self.snapshot.period,
-            compute: self.snapshot.compute,
-            force_fallbacks: self.output.status.force_failures,
-        };
-    }
 }
 
 fn scene<'a>(
@@ -439,32 +337,5 @@ fn scene<'a>(
         foot_force: sensors.foot_force,
         now_ns,
         dt_s,
-    }
-}
-
-/// Before the first sample.
-fn nothing_known() -> Snapshot {
-    let nowhere = BodyState { pose: Isometry3::identity(), target: Isometry3::identity() };
-    Snapshot {
-        time_ns: 0,
-        mode: Mode::Damped,
-        phase: Phase::Damped,
-        goal: Mode::Damped,
-        acknowledged_request: 0,
-        refusal: None,
-        engagement: 0,
-        assessment: Assessment::default(),
-        joint_position: JointVector::zeros(),
-        joint_velocity: JointVector::zeros(),
-        joint_torque: JointVector::zeros(),
-        opening: [0.0; 2],
-        foot_force: [0.0; 4],
-        world_resets: 0,
-        torso: nowhere,
-        grippers: [nowhere; 2],
-        command: CommandTrace::default(),
-        period: Percentiles::default(),
-        compute: Percentiles::default(),
-        force_fallbacks: 0,
     }
 }

@@ -9,11 +9,13 @@
 
 mod controller;
 mod posture;
+mod report;
 mod requests;
 mod run;
 mod settings;
 mod snapshot;
 mod timing;
+mod watch;
 
 pub use controller::{Controller, Inputs, Options};
 pub use run::{Wish, run};

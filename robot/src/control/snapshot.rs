@@ -77,3 +77,32 @@ pub struct Snapshot {
     /// Steps without contact forces.
     pub force_fallbacks: u64,
 }
+
+impl Snapshot {
+    /// Before the first sample.
+    pub fn nothing_known() -> Self {
+        let nowhere = BodyState { pose: Isometry3::identity(), target: Isometry3::identity() };
+        Self {
+            time_ns: 0,
+            mode: Mode::Damped,
+            phase: Phase::Damped,
+            goal: Mode::Damped,
+            acknowledged_request: 0,
+            refusal: None,
+            engagement: 0,
+            assessment: Assessment::default(),
+            joint_position: JointVector::zeros(),
+            joint_velocity: JointVector::zeros(),
+            joint_torque: JointVector::zeros(),
+            opening: [0.0; 2],
+            foot_force: [0.0; 4],
+            world_resets: 0,
+            torso: nowhere,
+            grippers: [nowhere; 2],
+            command: CommandTrace::default(),
+            period: Percentiles::default(),
+            compute: Percentiles::default(),
+            force_fallbacks: 0,
+        }
+    }
+}

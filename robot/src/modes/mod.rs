@@ -8,16 +8,23 @@
 //!                          ├─────────────────────────────────────┘             ▼             │
 //!                          └────────────────── lower foot ◄────────────────── stow ◄─────────┘
 //! ```
-//! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves.
+//! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves, and where the
+//! operator moves, [`Driving`] does.
 
 mod choreography;
+mod driving;
+mod leg_return;
 mod machine;
 mod mode;
+mod posture_motion;
+mod scene;
 mod setpoint;
 mod settings;
 
-pub use choreography::{Choreography, Progress, Scene};
+pub use choreography::{Choreography, Progress};
+pub use driving::{Driving, Operator};
 pub use machine::{Inputs, Machine, Refusal, Request, Start};
 pub use mode::{Mode, Phase};
+pub use scene::Scene;
 pub use setpoint::{ArmGoal, Setpoint};
 pub use settings::{JointGains, MotionSettings, PoseSettings};

@@ -1,0 +1,186 @@
+//! Torso, gripper and jaws as the operator moves them, inside every limit.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::{
+    scene::Scene,
+    setpoint::{ArmGoal, Setpoint},
+};
+use crate::{
+    commander::{
+        Command, DrivenBody, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock, from_above,
+        push_inside,
+    },
+    joints::{JointVector, Side},
+    kinematics::torso_from_frame,
+    model::Frame,
+};
+
+/// What comes from the operator in one control step.
+#[derive(Debug, Clone, Copy)]
+pub struct Operator<'a> {
+    /// The latest command, and what it means for the targets.
+    pub command: Option<(&'a Command, Grip)>,
+    /// The command is one that has not been seen before.
+    pub fresh: bool,
+    /// How often commands come.
+    pub clock: &'a SampleClock,
+}
+
+/// The bodies that the operator moves.
+#[derive(Debug, Clone)]
+pub struct Driving {
+    limits: Limits,
+    torso: DrivenBody,
+    gripper: DrivenBody,
+    gripper_start: Vector3<f64>,
+    reach: Reach,
+    opening: [f64; 2],
+    opening_goal: [f64; 2],
+}
+
+impl Driving {
+    /// At rest.
+    pub fn new(limits: Limits, posture: &JointVector) -> Self {
+        let still = PoseReference::hold(&Isometry3::identity());
+        Self {
+            torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
+            gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
+            gripper_start: Vector3::zeros(),
+            reach: Reach::new(Side::Right, posture, limits.reach),
+            opening: [0.0; 2],
+            opening_goal: [0.0; 2],
+            limits,
+        }
+    }
+
+    /// Openings asked of the grippers right, left.
+    pub fn opening(&self) -> [f64; 2] {
+        self.opening
+    }
+
+    /// Takes over the torso on four feet.
+    pub fn begin_stance(&mut self, setpoint: &Setpoint) {
+        self.begin_torso(setpoint, self.limits.stance_torso_rate);
+    }
+
+    /// Takes over torso and gripper; the gripper begins where the desired joints hold it.
+    pub fn begin_gripper(&mut self, side: Side, setpoint: &mut Setpoint, scene: &Scene<'_>) {
+        self.begin_torso(setpoint, self.limits.gripper_torso_rate);
+        let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
+        let gripper = PoseReference::hold(&(setpoint.torso.pose() * torso_from_gripper));
+        self.gripper = DrivenBody::new(gripper, self.limits.follower_rad_s, self.limits.gripper_rate);
+        self.gripper_start = gripper.point.position;
+        self.reach = Reach::new(side, scene.desired, self.limits.reach);
+        setpoint.arms[side.index()] = ArmGoal::Gripper(gripper);
+    }
+
+    fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits) {
+        self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
+    }
+
+    /// One step of torso and, if a side is given, its gripper.
+    pub fn step(
+        &mut self,
+        side: Option<Side>,
+        operator: &Operator<'_>,
+        scene: &Scene<'_>,
+        setpoint: &mut Setpoint,
+    ) {
+        self.listen(side, operator, scene.now_ns);
+        self.move_torso(side.is_some(), scene, setpoint);
+        if let Some(side) = side {
+            self.move_gripper(side, scene, setpoint);
+        }
+    }
+
+    /// Moves the jaws towards their goals; in every phase.
+    pub fn move_jaws(&mut self, dt_s: f64) {
+        let step = self.limits.opening_per_s * dt_s;
+        for (opening, goal) in self.opening.iter_mut().zip(self.opening_goal) {
+            *opening += (goal - *opening).clamp(-step, step);
+        }
+    }
+
+    fn listen(&mut self, side: Option<Side>, operator: &Operator<'_>, now_ns: u64) {
+        let Some((command, grip)) = operator.command else { return self.release() };
+        match grip {
+            Grip::Frozen => return,
+            Grip::Released => return self.release(),
+            Grip::Begins => {
+                self.torso.engage();
+                self.gripper.engage();
+            }
+            Grip::Resumes => self.release(),
+            Grip::Holds if !operator.fresh => return,
+            Grip::Holds => {}
+        }
+        self.torso.displace(command.torso.as_ref(), operator.clock, now_ns);
+        if let Some(side) = side {
+            let (palm, opening) = (command.palms[side.index()], command.opening[side.index()]);
+            self.gripper.displace(palm.as_ref(), operator.clock, now_ns);
+            self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
+        }
+    }
+
+    fn release(&mut self) {
+        self.torso.release();
+        self.gripper.release();
+    }
+
+    /// The torso, within its range, with the centre of mass over the feet.
+    fn move_torso(&mut self, manipulating: bool, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        let range = if manipulating { self.limits.gripper_torso } else { self.limits.stance_torso };
+        let margin_m = self.limits.support_margin_m;
+        let (feet, count) = scene.standing_feet(&setpoint.contacts);
+        let com_from_torso = from_above(&(scene.com - scene.state.world_from_torso.translation.vector));
+        self.torso.advance(scene.now_ns, scene.dt_s, |wanted| {
+            let mut pose = range.clamp(wanted);
+            let com = from_above(&pose.translation.vector) + com_from_torso;
+            let push = push_inside(&com, &feet[..count], margin_m);
+            pose.translation.vector += Vector3::new(push.x, push.y, 0.0);
+            pose
+        });
+        setpoint.torso = *self.torso.reference();
+    }
+
+    /// The gripper, within its box, above the ground, within reach.
+    fn move_gripper(&mut self, side: Side, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        let outward = if side == Side::Left { 1.0 } else { -1.0 };
+        let (limits, start) = (self.limits.gripper, self.gripper_start);
+        let lowest = self.lowest_gripper(side, scene, setpoint);
+        let (reach, world_from_torso) = (&mut self.reach, setpoint.torso.pose());
+        self.gripper.advance(scene.now_ns, scene.dt_s, |wanted| {
+            let mut position = limits.clamp(&wanted.translation.vector, &start, outward);
+            position.z = position.z.max(lowest);
+            let inside = Isometry3::from_parts(position.into(), wanted.rotation);
+            world_from_torso * reach.nearest(scene.model, &world_from_torso.inv_mul(&inside))
+        });
+        setpoint.arms[side.index()] = ArmGoal::Gripper(*self.gripper.reference());
+    }
+
+    /// Lowest height of a gripper's target at which neither it nor the foot behind it touches the ground.
+    ///
+    /// Leg and arm have just six joints, so gripper and foot rise and fall together: what room both have left
+    /// now is what the gripper may go down from here.
+    fn lowest_gripper(&self, side: Side, scene: &Scene<'_>, setpoint: &Setpoint) -> f64 {
+        let height = |frame| {
+            let torso_from_frame = torso_from_frame(scene.model, scene.desired, frame);
+            (setpoint.torso.pose() * torso_from_frame).translation.z
+        };
+        let (mut ground, mut count) = (0.0, 0.0);
+        for leg in setpoint.contacts.legs() {
+            ground += scene.foot(leg).z;
+            count += 1.0;
+        }
+        if count == 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        // Of the centres of feet that stand: a foot at this height touches the ground.
+        let ground = ground / count;
+        let gripper = height(Frame::Gripper(side));
+        let foot_room = height(Frame::Foot(side.leg())) - ground - self.limits.foot_clearance_m;
+        let gripper_room = gripper - ground - self.limits.gripper_clearance_m;
+        gripper - foot_room.min(gripper_room)
+    }
+}

@@ -1,0 +1,79 @@
+//! What scripted and driven motions look at: the robot as it is, and as it was asked to be.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
+
+use crate::{
+    commander::{from_above, push_inside},
+    dynamics::State,
+    joints::{JointVector, Leg, Side},
+    kinematics::torso_from_frame,
+    model::{Frame, Model},
+    wbc::ContactSet,
+};
+
+/// The robot in one control step.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// The robot.
+    pub model: &'a Model,
+    /// Where it is, by the estimator.
+    pub state: &'a State,
+    /// Joint positions asked for in the last step.
+    pub desired: &'a JointVector,
+    /// Centre of mass in the world.
+    pub com: Vector3<f64>,
+    /// Vertical forces of the feet, N.
+    pub foot_force: [f64; 4],
+    /// Now.
+    pub now_ns: u64,
+    /// Since the last step, s.
+    pub dt_s: f64,
+}
+
+impl Scene<'_> {
+    /// Centre of a foot in the world, as measured.
+    pub fn foot(&self, leg: Leg) -> Vector3<f64> {
+        let torso_from_foot = torso_from_frame(self.model, &self.state.position, Frame::Foot(leg));
+        (self.state.world_from_torso * torso_from_foot).translation.vector
+    }
+
+    /// Joint angles asked of an arm.
+    pub fn desired_arm(&self, side: Side) -> Vector3<f64> {
+        self.desired.fixed_rows::<3>(side.first_arm_joint()).into_owned()
+    }
+
+    /// Where a front foot completes the parallelogram of the other three (the paper's switcher).
+    pub fn landing(&self, side: Side) -> Vector3<f64> {
+        let (other, rear_same, rear_other) = match side {
+            Side::Right => (Leg::FrontLeft, Leg::RearRight, Leg::RearLeft),
+            Side::Left => (Leg::FrontRight, Leg::RearLeft, Leg::RearRight),
+        };
+        self.foot(other) + self.foot(rear_same) - self.foot(rear_other)
+    }
+
+    /// Pose of a torso that stands level over the middle of the feet, facing where they face.
+    pub fn middle_of_feet(&self, height_m: f64) -> Isometry3<f64> {
+        let feet = Leg::ALL.map(|leg| self.foot(leg));
+        let middle = feet.iter().sum::<Vector3<f64>>() / 4.0;
+        let [front_right, front_left, rear_right, rear_left] = feet;
+        let forward = front_right + front_left - rear_right - rear_left;
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), forward.y.atan2(forward.x));
+        Isometry3::from_parts((middle + Vector3::z() * height_m).into(), yaw)
+    }
+
+    /// The feet that stand, seen from above, and how many they are.
+    pub fn standing_feet(&self, contacts: &ContactSet) -> ([Vector2<f64>; 4], usize) {
+        let (mut feet, mut count) = ([Vector2::zeros(); 4], 0);
+        for leg in contacts.legs() {
+            feet[count] = from_above(&self.foot(leg));
+            count += 1;
+        }
+        (feet, count)
+    }
+
+    /// Whether the centre of mass is at least so far inside the feet that stay when one front foot lifts.
+    pub fn may_lift(&self, side: Side, margin_m: f64) -> bool {
+        let (feet, count) = self.standing_feet(&ContactSet::without(side.leg()));
+        push_inside(&from_above(&self.com), &feet[..count], margin_m) == Vector2::zeros()
+    }
+}
