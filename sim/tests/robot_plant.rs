@@ -7,7 +7,7 @@ use locoman_robot::dynamics::{DOF, Dynamics, MassMatrix, State};
 use locoman_robot::joints::{JointVector, Leg, Side};
 use locoman_robot::model::{Frame, JOINT_NAMES, Model};
 use locoman_robot::plant::{JointCommand, Plant, Sensors};
-use locoman_sim::robot::{LockstepPlant, Options};
+use locoman_sim::robot::{Disturbance, LockstepPlant, Options};
 use mujoco_rs::prelude::MjtObjBase;
 use nalgebra::{Isometry3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
@@ -167,10 +167,10 @@ fn a_command_that_is_no_number_is_dropped() {
 #[test]
 fn a_hard_push_topples_the_robot_and_a_soft_one_does_not() {
     let mut sut = plant("hw", "standing", 1);
-    sut.push(Vector3::new(0.0, 30.0, 0.0), 0.1);
+    sut.disturb(&Disturbance::push_torso(Vector3::new(0.0, 30.0, 0.0), 0.1)).unwrap();
     run(&mut sut, &stand(0.0), 1.0);
     assert!(!sut.truth().fallen);
-    sut.push(Vector3::new(0.0, 400.0, 0.0), 0.3);
+    sut.disturb(&Disturbance::push_torso(Vector3::new(0.0, 400.0, 0.0), 0.3)).unwrap();
     run(&mut sut, &stand(0.0), 1.5);
     assert!(sut.truth().fallen);
 }

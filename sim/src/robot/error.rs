@@ -47,6 +47,14 @@ pub enum SimRobotError {
     /// MuJoCo refused the scene.
     #[error("MuJoCo: {0}")]
     MuJoCo(String),
+    /// A disturbance that no world can do.
+    #[error("{what} must be a finite number that is not negative, not {value}")]
+    Disturbance {
+        /// Which number of it.
+        what: &'static str,
+        /// What was asked for.
+        value: f64,
+    },
     /// The socket for commands.
     #[error("the socket for commands: {0}")]
     Socket(std::io::Error),

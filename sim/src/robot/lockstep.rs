@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use locoman_robot::plant::{JointCommand, Plant, PlantError, Sensors};
-use nalgebra::Vector3;
 
 use super::SimRobotError;
+use super::disturbance::Disturbance;
 use super::machine::{Options, SimRobot};
 use super::world::Truth;
 
@@ -31,9 +31,9 @@ impl LockstepPlant {
         self.robot.reset(posture)
     }
 
-    /// Pushes the trunk at its centre of mass: world axes, from now on.
-    pub fn push(&mut self, force_n: Vector3<f64>, duration_s: f64) {
-        self.robot.push(force_n, duration_s);
+    /// Disturbs the robot from now on.
+    pub fn disturb(&mut self, disturbance: &Disturbance) -> Result<(), SimRobotError> {
+        self.robot.disturb(disturbance)
     }
 
     /// The machine itself.

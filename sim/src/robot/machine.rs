@@ -10,11 +10,12 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use locoman_robot::joints::JointVector;
+use locoman_robot::joints::{JointVector, Leg, Side};
 use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Sensors};
 use nalgebra::Vector3;
 
+use super::disturbance::{Disturbance, Target};
 use super::drives::Drives;
 use super::noise::SensorNoise;
 use super::scene::{Posture, Scene};
@@ -60,7 +61,10 @@ pub struct SimRobot {
     /// Steps since time zero, and the clock's reading then.
     step: u64,
     epoch_ns: u64,
-    push_until_step: u64,
+    /// Step at which the push on each target ends; 0 without a push.
+    push_until: [u64; Target::COUNT],
+    /// Commands sent before this step are lost.
+    silent_until: u64,
 }
 
 impl SimRobot {
@@ -91,7 +95,8 @@ impl SimRobot {
             rejected_commands: 0,
             step: 0,
             epoch_ns: 0,
-            push_until_step: 0,
+            push_until: [0; Target::COUNT],
+            silent_until: 0,
         };
         robot.reset(&options.posture)?;
         Ok(robot)
@@ -102,11 +107,12 @@ impl SimRobot {
         let posture = self.scene.posture(posture)?.clone();
         self.noise = SensorNoise::new(self.scene.profile(&self.profile)?, self.seed);
         self.under_way.clear();
-        self.push_until_step = 0;
-        self.world.set_push(Vector3::zeros());
+        self.push_until = [0; Target::COUNT];
+        self.silent_until = 0;
+        self.world.calm()?;
         self.latched = if posture.held { hold(&posture) } else { JointCommand::damping() };
         self.world.place(&posture, self.drives.jaw_angle(0.0));
-        for _ in 0..(posture.settle_s / self.scene.physics.timestep_s).round() as u64 {
+        for _ in 0..self.steps(posture.settle_s) {
             self.step_once();
         }
         self.step = 0;
@@ -116,6 +122,10 @@ impl SimRobot {
     /// A command that arrives `after_ns` of the present exchange; a nonsensical one is dropped, as a drive
     /// drops a damaged frame.
     pub fn send(&mut self, command: &JointCommand, after_ns: u64) {
+        let arrival = self.step + after_ns.div_ceil(self.step_ns());
+        if arrival < self.silent_until {
+            return;
+        }
         if !command.is_finite() {
             self.rejected_commands += 1;
             return;
@@ -124,7 +134,6 @@ impl SimRobot {
             // Faster than any latency allows for: the oldest comes into force early.
             self.apply_next();
         }
-        let arrival = self.step + after_ns.div_ceil(self.step_ns());
         self.under_way.push_back((arrival + self.latency_steps, *command));
     }
 
@@ -134,10 +143,7 @@ impl SimRobot {
             while self.under_way.front().is_some_and(|(due, _)| *due <= self.step) {
                 self.apply_next();
             }
-            if self.push_until_step != 0 && self.step >= self.push_until_step {
-                self.world.set_push(Vector3::zeros());
-                self.push_until_step = 0;
-            }
+            self.end_pushes();
             self.step_once();
             self.step += 1;
         }
@@ -157,11 +163,24 @@ impl SimRobot {
         truth
     }
 
-    /// A force on the trunk's centre of mass, world axes, from now on.
-    pub fn push(&mut self, force_n: Vector3<f64>, duration_s: f64) {
-        self.world.set_push(force_n);
-        let steps = (duration_s / self.scene.physics.timestep_s).round() as u64;
-        self.push_until_step = self.step + steps.max(1);
+    /// Disturbs the robot from now on.
+    pub fn disturb(&mut self, disturbance: &Disturbance) -> Result<(), SimRobotError> {
+        disturbance.check()?;
+        match *disturbance {
+            Disturbance::Push { target, force_n, torque_nm, duration_s } => {
+                self.world.set_push(target, force_n, torque_nm);
+                self.push_until[target.index()] = self.step + self.steps(duration_s).max(1);
+            }
+            Disturbance::Load { side, mass_kg } => self.world.set_load(side, mass_kg)?,
+            Disturbance::Friction { foot: Some(leg), coefficient } => {
+                self.world.set_friction(&[leg], coefficient)?;
+            }
+            Disturbance::Friction { foot: None, coefficient } => {
+                self.world.set_friction(&Leg::ALL, coefficient)?;
+            }
+            Disturbance::Silence { duration_s } => self.silent_until = self.step + self.steps(duration_s),
+        }
+        Ok(())
     }
 
     /// Sets the sensors' clock, which starts at 0 and advances with the exchanges.
@@ -192,6 +211,20 @@ impl SimRobot {
     /// The physics, for tests.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
+    }
+
+    fn end_pushes(&mut self) {
+        for target in [Target::Torso, Target::Gripper(Side::Right), Target::Gripper(Side::Left)] {
+            let until = &mut self.push_until[target.index()];
+            if *until != 0 && self.step >= *until {
+                *until = 0;
+                self.world.set_push(target, Vector3::zeros(), Vector3::zeros());
+            }
+        }
+    }
+
+    fn steps(&self, seconds: f64) -> u64 {
+        (seconds / self.scene.physics.timestep_s).round() as u64
     }
 
     fn apply_next(&mut self) {

@@ -20,6 +20,8 @@ pub const JAW_NAMES: [&str; 2] = ["right_jaw", "left_jaw"];
 pub const FOOT_NAMES: [&str; 4] = ["FR_foot", "FL_foot", "RR_foot", "RL_foot"];
 /// Sites at the grasp frames.
 pub const GRIPPER_NAMES: [&str; 2] = ["right_gripper", "left_gripper"];
+/// Bodies without mass at the grasp frames: where loads are held and pushes act.
+pub const GRASP_NAMES: [&str; 2] = ["right_grasp", "left_grasp"];
 /// The trunk's body.
 pub const TRUNK: &str = "trunk";
 /// The ground's geom.
@@ -37,6 +39,9 @@ const TRUNK_BITS: ContactBits = ContactBits { is: 2, touches: 1 };
 const LEG_BITS: ContactBits = ContactBits { is: 0, touches: 1 };
 const ARM_BITS: [ContactBits; 2] =
     [ContactBits { is: 4, touches: 1 | 2 }, ContactBits { is: 8, touches: 1 | 2 | 4 }];
+
+/// Where a foot touches, its own parameters count and not those of what it touches.
+const FOOT_CONTACT: &str = r#" priority="1""#;
 
 /// The scene as MJCF text.
 pub fn write(model: &Model, scene: &Scene, profile: &Profile) -> Result<String, SimRobotError> {
@@ -186,6 +191,11 @@ impl Writer<'_> {
         }
         self.line(inertial(&rest));
         self.line(format!(r#"<site name="{name}" pos="{}"/>"#, numbers(grasp.as_slice())));
+        self.line(format!(
+            r#"<body name="{}" pos="{}"><inertial mass="0" pos="0 0 0" diaginertia="0 0 0"/></body>"#,
+            GRASP_NAMES[side.index()],
+            numbers(grasp.as_slice()),
+        ));
         self.geoms(&format!("{name}_servo"), Part::EndEffector, side, &grasp, bits);
         for (jaw, suffix) in jaws.iter().zip(["", "_partner"]) {
             let jaw_name = format!("{}{suffix}", JAW_NAMES[side.index()]);
@@ -196,14 +206,18 @@ impl Writer<'_> {
             ));
             self.line(inertial(&jaw.body()));
             let shape = Shape::Capsule { from: [0.0; 3], to: jaw.tip().into(), radius: JAW_RADIUS_M };
-            self.line(geom(&jaw_name, shape, &Vector3::zeros(), bits));
+            self.line(geom(&jaw_name, shape, &Vector3::zeros(), &contact_attributes(bits)));
             self.line("</body>");
         }
     }
 
     fn geoms(&mut self, name: &str, part: Part, side: Side, origin: &Vector3<f64>, bits: ContactBits) {
+        let mut attributes = contact_attributes(bits);
+        if part == Part::Foot {
+            attributes.push_str(FOOT_CONTACT);
+        }
         for (number, shape) in shapes(part, side).into_iter().enumerate() {
-            self.line(geom(&format!("{name}_{number}"), shape, origin, bits));
+            self.line(geom(&format!("{name}_{number}"), shape, origin, &attributes));
         }
     }
 }
@@ -222,7 +236,7 @@ fn inertial(body: &RigidBody) -> String {
     )
 }
 
-fn geom(name: &str, shape: Shape, origin: &Vector3<f64>, bits: ContactBits) -> String {
+fn geom(name: &str, shape: Shape, origin: &Vector3<f64>, attributes: &str) -> String {
     let at = |p: [f64; 3]| numbers((origin + Vector3::from(p)).as_slice());
     let form = match shape {
         Shape::Sphere { center, radius } => format!(r#"type="sphere" pos="{}" size="{radius}""#, at(center)),
@@ -233,7 +247,7 @@ fn geom(name: &str, shape: Shape, origin: &Vector3<f64>, bits: ContactBits) -> S
             format!(r#"type="box" pos="{}" size="{}""#, at(center), numbers(&half))
         }
     };
-    format!(r#"<geom name="{name}" {form} {}/>"#, contact_attributes(bits))
+    format!(r#"<geom name="{name}" {form} {attributes}/>"#)
 }
 
 /// Shortest decimal forms that read back to the same numbers, so nothing is lost on the way.

@@ -6,6 +6,7 @@
 //! ```
 
 pub mod command;
+pub mod disturbance;
 pub mod drives;
 mod error;
 pub mod jaws;
@@ -20,6 +21,7 @@ pub mod shapes;
 pub mod world;
 
 pub use command::{Args, run};
+pub use disturbance::{Disturbance, Target};
 pub use error::SimRobotError;
 pub use lockstep::LockstepPlant;
 pub use machine::{Options, SimRobot};

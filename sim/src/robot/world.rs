@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use locoman_robot::joints::{JOINTS, JointVector};
+use locoman_robot::joints::{JOINTS, JointVector, Leg, Side};
 use locoman_robot::model::JOINT_NAMES;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::SimRobotError;
-use super::mjcf::{FOOT_NAMES, GRIPPER_NAMES, GROUND, JAW_NAMES, TRUNK};
+use super::disturbance::Target;
+use super::mjcf::{FOOT_NAMES, GRASP_NAMES, GRIPPER_NAMES, GROUND, JAW_NAMES, TRUNK};
 use super::scene::Posture;
 
 /// Motors: the joints, then the jaws right and left.
@@ -23,16 +24,20 @@ const TRUNK_ANGULAR_VELOCITY: usize = 3;
 #[derive(Debug)]
 pub struct World {
     data: MjData<Arc<MjModel>>,
+    /// The model without disturbances.
+    calm: Arc<MjModel>,
     position_at: [usize; MOTORS],
     velocity_at: [usize; MOTORS],
     partner_position_at: [usize; 2],
     foot_sites: [usize; 4],
+    foot_geoms: [usize; 4],
     gripper_sites: [usize; 2],
     /// Which foot a geom is, if it is one.
     foot_of_geom: Vec<Option<u8>>,
     is_trunk_geom: Vec<bool>,
     ground: i32,
     trunk: usize,
+    grasps: [usize; 2],
 }
 
 /// What the simulator knows and no robot does. Poses map body points into the simulator's world.
@@ -61,8 +66,7 @@ pub struct Truth {
 impl World {
     /// Compiles the scene.
     pub fn new(mjcf: &str) -> Result<Self, SimRobotError> {
-        let model =
-            MjModel::from_xml_string(mjcf).map_err(|error| SimRobotError::MuJoCo(error.to_string()))?;
+        let model = MjModel::from_xml_string(mjcf).map_err(mujoco)?;
         let joint = |name: &str| id(&model, MjtObjBase::mjOBJ_JOINT, name);
         let site = |name: &str| id(&model, MjtObjBase::mjOBJ_SITE, name);
 
@@ -78,31 +82,38 @@ impl World {
             partner_position_at[place] = address(model.jnt_qposadr()[joint(&format!("{name}_partner"))?]);
         }
         let mut foot_sites = [0; 4];
+        let mut foot_geoms = [0; 4];
         let mut foot_of_geom = vec![None; address(model.ngeom())];
         for (foot, name) in FOOT_NAMES.iter().enumerate() {
             foot_sites[foot] = site(name)?;
-            foot_of_geom[id(&model, MjtObjBase::mjOBJ_GEOM, &format!("{name}_0"))?] = u8::try_from(foot).ok();
+            foot_geoms[foot] = id(&model, MjtObjBase::mjOBJ_GEOM, &format!("{name}_0"))?;
+            foot_of_geom[foot_geoms[foot]] = u8::try_from(foot).ok();
         }
         let mut gripper_sites = [0; 2];
         for (side, name) in GRIPPER_NAMES.iter().enumerate() {
             gripper_sites[side] = site(name)?;
         }
-        let trunk = id(&model, MjtObjBase::mjOBJ_BODY, TRUNK)?;
+        let body = |name: &str| id(&model, MjtObjBase::mjOBJ_BODY, name);
+        let trunk = body(TRUNK)?;
+        let grasps = [body(GRASP_NAMES[0])?, body(GRASP_NAMES[1])?];
         let is_trunk_geom = model.geom_bodyid().iter().map(|&body| address(body) == trunk).collect();
         let ground = i32::try_from(id(&model, MjtObjBase::mjOBJ_GEOM, GROUND)?).unwrap_or_default();
-        let data =
-            MjData::try_new(Arc::new(model)).map_err(|error| SimRobotError::MuJoCo(error.to_string()))?;
+        let calm = Arc::new(model);
+        let data = MjData::try_new(Arc::clone(&calm)).map_err(mujoco)?;
         Ok(Self {
             data,
+            calm,
             position_at,
             velocity_at,
             partner_position_at,
             foot_sites,
+            foot_geoms,
             gripper_sites,
             foot_of_geom,
             is_trunk_geom,
             ground,
             trunk,
+            grasps,
         })
     }
 
@@ -211,9 +222,52 @@ impl World {
         self.data.time()
     }
 
-    /// A force on the trunk's centre of mass in world axes, N, until changed.
-    pub fn set_push(&mut self, force_n: Vector3<f64>) {
-        self.data.xfrc_applied_mut()[self.trunk] = [force_n.x, force_n.y, force_n.z, 0.0, 0.0, 0.0];
+    /// A wrench on a target in world axes until changed, N and N m.
+    pub fn set_push(&mut self, target: Target, force: Vector3<f64>, torque: Vector3<f64>) {
+        // MuJoCo applies it at the body's centre of mass: the trunk's own, and the grasp centre.
+        let body = match target {
+            Target::Torso => self.trunk,
+            Target::Gripper(side) => self.grasps[side.index()],
+        };
+        self.data.xfrc_applied_mut()[body] = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+    }
+
+    /// A cube of 40 mm in a gripper.
+    pub fn set_load(&mut self, side: Side, mass_kg: f64) -> Result<(), SimRobotError> {
+        /// Edge of the cube, m.
+        const EDGE: f64 = 0.04;
+        let grasp = self.grasps[side.index()];
+        let mut model = self.data.model().clone();
+        let more = mass_kg - model.body_mass()[grasp];
+        model.body_mass_mut()[grasp] = mass_kg;
+        model.body_inertia_mut()[grasp] = [mass_kg * EDGE * EDGE / 6.0; 3];
+        let mut body = grasp;
+        while body != 0 {
+            model.body_subtreemass_mut()[body] += more;
+            body = address(model.body_parentid()[body]);
+        }
+        self.disturbed(model)
+    }
+
+    /// Friction coefficient between these feet and the ground.
+    pub fn set_friction(&mut self, feet: &[Leg], coefficient: f64) -> Result<(), SimRobotError> {
+        let mut model = self.data.model().clone();
+        for foot in feet {
+            model.geom_friction_mut()[self.foot_geoms[foot.index()]][0] = coefficient;
+        }
+        self.disturbed(model)
+    }
+
+    /// Ends all disturbances.
+    pub fn calm(&mut self) -> Result<(), SimRobotError> {
+        self.data.xfrc_applied_mut().fill([0.0; 6]);
+        self.data.try_swap_model(Arc::clone(&self.calm)).map_err(mujoco)?;
+        Ok(())
+    }
+
+    fn disturbed(&mut self, model: MjModel) -> Result<(), SimRobotError> {
+        self.data.try_swap_model(Arc::new(model)).map_err(mujoco)?;
+        Ok(())
     }
 
     /// Everything, exact. Brings the frames up to the present state first.
@@ -233,6 +287,10 @@ impl World {
             fallen: self.fallen(),
         }
     }
+}
+
+fn mujoco(error: impl std::fmt::Display) -> SimRobotError {
+    SimRobotError::MuJoCo(error.to_string())
 }
 
 fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, SimRobotError> {
