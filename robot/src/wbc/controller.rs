@@ -3,6 +3,7 @@
 use super::{
     ContactSet, Objective, WbcFault, WbcOutput, WbcSettings, WbcStatus,
     ground::{ForceDistribution, GroundReaction, ground_load},
+    objective::Robot,
     stops::{MOST_IN_A_LIMB, Stops, Surroundings},
     task::Task,
     tracking::Tracking,
@@ -129,10 +130,11 @@ impl WholeBodyController {
     /// Stops, then objectives.
     fn track_with(&mut self, state: &State, objectives: &[Objective], stops: &Stops, status: &mut WbcStatus) {
         let gains = &self.settings.objectives;
+        let robot = Robot { state, dynamics: &self.dynamics };
         stops.for_each_task(state, &self.dynamics, &gains.arm_posture, |task| self.tracking.add(&task, 0.0));
         for objective in objectives {
             let gains = gains.of(objective.kind());
-            match Task::objective(objective, &self.dynamics, state, gains) {
+            match objective.task(&robot, gains) {
                 Some(task) => self.tracking.add(&task, gains.damping_start),
                 None => status.fault = Some(WbcFault::Reference),
             }

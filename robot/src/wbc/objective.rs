@@ -1,8 +1,36 @@
 //! What can be controlled, and the references that say where it should be.
+//!
+//! A list of [`Objective`]s is plain data; what one of them means to the hierarchy, its [`Track`]er knows. A
+//! new kind is a variant here and, where none of the trackers fits, a file beside them.
+
+mod arm_posture;
+mod frame_orientation;
+mod frame_position;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::joints::{Leg, Side};
+use self::{arm_posture::ArmPosture, frame_orientation::FrameOrientation, frame_position::FramePosition};
+use super::{Gains, task::Task};
+use crate::{
+    dynamics::{Dynamics, State},
+    joints::{Leg, Side},
+    model::Frame,
+};
+
+/// The robot as an objective looks at it.
+#[derive(Clone, Copy)]
+pub(super) struct Robot<'a> {
+    /// Where it is.
+    pub(super) state: &'a State,
+    /// Kinematics and dynamics there.
+    pub(super) dynamics: &'a Dynamics,
+}
+
+/// Something that is to be somewhere and to move somehow, as the hierarchy takes it.
+pub(super) trait Track {
+    /// J, x̄ - x, the desired velocity, and the acceleration command with these gains.
+    fn task(&self, robot: &Robot<'_>, gains: &Gains) -> Task;
+}
 
 /// A desired point and its motion: in the world, or the three joints of an arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,5 +113,19 @@ impl Objective {
             Self::GripperOrientation(side, _) => ObjectiveKind::GripperOrientation(*side),
             Self::ArmPosture(side, _) => ObjectiveKind::ArmPosture(*side),
         }
+    }
+    /// Its task; nothing if its reference holds a number that is not finite.
+    pub(super) fn task(&self, robot: &Robot<'_>, gains: &Gains) -> Option<Task> {
+        let point = |frame, reference| FramePosition { frame, reference }.task(robot, gains);
+        let rotation = |frame, reference| FrameOrientation { frame, reference }.task(robot, gains);
+        let task = match self {
+            Self::TorsoPosition(reference) => point(Frame::Torso, reference),
+            Self::TorsoOrientation(reference) => rotation(Frame::Torso, reference),
+            Self::FootPosition(leg, reference) => point(Frame::Foot(*leg), reference),
+            Self::GripperPosition(side, reference) => point(Frame::Gripper(*side), reference),
+            Self::GripperOrientation(side, reference) => rotation(Frame::Gripper(*side), reference),
+            Self::ArmPosture(side, reference) => ArmPosture { side: *side, reference }.task(robot, gains),
+        };
+        task.is_finite().then_some(task)
     }
 }

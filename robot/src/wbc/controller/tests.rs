@@ -154,7 +154,7 @@ proptest! {
                 .iter()
                 .map(|objective| {
                     let gains = sut.settings.objectives.of(objective.kind());
-                    let task = Task::objective(objective, &sut.dynamics, &state, gains).unwrap();
+                    let task = objective.task(&Robot { state: &state, dynamics: &sut.dynamics }, gains).unwrap();
                     [&position, &velocity, &acceleration].map(|solution| reached(&task, solution))
                 })
                 .collect();
@@ -199,7 +199,7 @@ fn objectives_that_can_be_reached_are_reached() {
     let acceleration = sut.track(&model, &state, &objectives, &contacts, &mut WbcStatus::default());
     for objective in &objectives {
         let gains = sut.settings.objectives.of(objective.kind());
-        let task = Task::objective(objective, &sut.dynamics, &state, gains).unwrap();
+        let task = objective.task(&Robot { state: &state, dynamics: &sut.dynamics }, gains).unwrap();
         let position = reached(&task, &sut.tracking.position_step());
         let velocity = reached(&task, &sut.tracking.velocity());
         assert!((position - task.error).amax() < 1e-10, "{:?}", objective.kind());

@@ -1,0 +1,36 @@
+//! The three joints of an arm.
+
+use nalgebra::Vector3;
+
+use super::{PointReference, Robot, Track};
+use crate::{
+    dynamics::DOF,
+    joints::Side,
+    wbc::{Gains, task::Task},
+};
+
+/// An arm that is to keep joint angles: J is a choice of columns, so that J̇ = 0.
+pub(super) struct ArmPosture<'a> {
+    pub(super) side: Side,
+    pub(super) reference: &'a PointReference,
+}
+
+impl Track for ArmPosture<'_> {
+    fn task(&self, robot: &Robot<'_>, gains: &Gains) -> Task {
+        let first = self.side.first_arm_joint();
+        let mut rows = [[0.0; DOF]; 3];
+        for (index, row) in rows.iter_mut().enumerate() {
+            row[6 + first + index] = 1.0;
+        }
+        let position = robot.state.position.fixed_rows::<3>(first);
+        let velocity = robot.state.velocity.fixed_rows::<3>(first).into_owned();
+        Task::commanded(
+            rows,
+            self.reference.position - position,
+            [self.reference.velocity, velocity],
+            self.reference.acceleration,
+            Vector3::zeros(),
+            gains,
+        )
+    }
+}
