@@ -17,4 +17,5 @@ pub mod model;
 pub mod modes;
 pub mod plant;
 pub mod supervisor;
+pub mod trajectory;
 pub mod wbc;

@@ -8,11 +8,17 @@
 use nalgebra::{Isometry3, Translation3};
 
 use super::{
-    follower::PoseFollower,
+    follower::{Lead, PoseFollower},
     limits::RateLimits,
     ramp::{Ramp, SampleClock},
     reference::PoseReference,
 };
+
+/// By how much the limits may move a target that counts as inside them: more than what finding the nearest
+/// pose within reach leaves.
+const TOLERANCE_M: f64 = 5e-4;
+/// The same for its orientation, rad.
+const TOLERANCE_RAD: f64 = 3e-3;
 
 /// A driven body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +104,29 @@ impl DrivenBody {
         }
         self.follower.follow(&self.target, dt_s);
     }
+
+    /// One control step along a motion that is known beforehand, the displacement since engagement: exactly,
+    /// as long as the pose at which it could be brought to rest is inside the limits.
+    pub fn advance_along(
+        &mut self,
+        displacement: &PoseReference,
+        dt_s: f64,
+        mut permitted: impl FnMut(&Isometry3<f64>) -> Isometry3<f64>,
+    ) {
+        let Some(drive) = &self.drive else { return self.follower.follow(&self.target, dt_s) };
+        let motion = displacement.displacing(&drive.anchor);
+        let wanted = self.follower.stopping_pose_of(&motion);
+        self.target = permitted(&wanted);
+        let lead = Lead { motion, share: share_inside(&wanted, &self.target) };
+        self.follower.follow_led(&self.target, Some(&lead), dt_s);
+    }
+}
+
+/// How far a motion may lead: 1 while the limits leave its target alone, 0 where they move it, without a step.
+fn share_inside(wanted: &Isometry3<f64>, permitted: &Isometry3<f64>) -> f64 {
+    let moved = (permitted.translation.vector - wanted.translation.vector).norm();
+    let turned = permitted.rotation.angle_to(&wanted.rotation);
+    (2.0 - (moved / TOLERANCE_M).max(turned / TOLERANCE_RAD)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

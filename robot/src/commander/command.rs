@@ -6,7 +6,7 @@ use locoman_protocol::{
 };
 use nalgebra::Isometry3;
 
-use crate::modes::Mode;
+use crate::{modes::Mode, trajectory::Trajectory};
 
 /// One uninterrupted engagement of one sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +49,8 @@ pub struct Command {
     pub mode_request: u64,
     /// The mode of that request.
     pub mode: Option<Mode>,
+    /// What the engagement plays from its beginning, in place of the displacements.
+    pub trajectory: Option<Trajectory>,
 }
 
 impl Command {
@@ -67,6 +69,7 @@ impl Command {
             opening: [message.right_opening, message.left_opening],
             mode_request: message.mode_request_id,
             mode: Mode::from_message(message.mode()),
+            trajectory: None,
         }
     }
 

@@ -86,6 +86,7 @@ mod tests {
             opening: [None; 2],
             mode_request: 0,
             mode: None,
+            trajectory: None,
         }
     }
 

@@ -13,14 +13,31 @@ use super::{limits::RateLimits, reference::PoseReference};
 /// Share of the greatest acceleration that braking plans with; the rest is for the filter's own lag.
 const BRAKING_SHARE: f64 = 0.5;
 
-/// One vector that follows another.
-fn step(error: &Vector3<f64>, velocity: &Vector3<f64>, omega: f64, speed: f64, limit: f64) -> Vector3<f64> {
+/// Velocity at which to close an error, to rest where it is zero.
+fn closing(error: &Vector3<f64>, omega: f64, limit: f64) -> Vector3<f64> {
     let distance = error.norm();
-    let wanted_speed =
-        (omega / 2.0 * distance).min(speed).min((2.0 * BRAKING_SHARE * limit * distance).sqrt());
-    let wanted = if distance > 1e-12 { error * (wanted_speed / distance) } else { Vector3::zeros() };
-    let acceleration = 2.0 * omega * (wanted - velocity);
-    acceleration.cap_magnitude(limit)
+    let speed = (omega / 2.0 * distance).min((2.0 * BRAKING_SHARE * limit * distance).sqrt());
+    if distance > 1e-12 { error * (speed / distance) } else { Vector3::zeros() }
+}
+
+/// ẍ = 2 ω (v_wanted - ẋ), limited.
+fn acceleration(
+    wanted: &Vector3<f64>,
+    velocity: &Vector3<f64>,
+    omega: f64,
+    speed: f64,
+    limit: f64,
+) -> Vector3<f64> {
+    (2.0 * omega * (wanted.cap_magnitude(speed) - velocity)).cap_magnitude(limit)
+}
+
+/// What a motion that knows where it goes asks of a follower.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lead {
+    /// Where the motion is now.
+    pub motion: PoseReference,
+    /// How far to go along, from 0 to 1; for the rest, the target is followed.
+    pub share: f64,
 }
 
 /// A pose that follows a target pose.
@@ -45,7 +62,12 @@ impl PoseFollower {
     /// The target at which the follower comes to rest without turning back: ahead by ẋ/ω, or by the braking
     /// distance if that is longer.
     pub fn stopping_pose(&self) -> Isometry3<f64> {
-        let PoseReference { point, rotation } = &self.reference;
+        self.stopping_pose_of(&self.reference)
+    }
+
+    /// The same for another motion.
+    pub fn stopping_pose_of(&self, motion: &PoseReference) -> Isometry3<f64> {
+        let PoseReference { point, rotation } = motion;
         let ahead = |velocity: &Vector3<f64>, limit: f64| {
             let time_s = (1.0 / self.omega).max(velocity.norm() / (2.0 * BRAKING_SHARE * limit));
             velocity * time_s
@@ -60,20 +82,51 @@ impl PoseFollower {
 
     /// Moves one step towards the target.
     pub fn follow(&mut self, target: &Isometry3<f64>, dt_s: f64) {
+        self.follow_led(target, None, dt_s);
+    }
+
+    /// Moves one step: along with the lead by its share, towards the target for the rest.
+    ///
+    /// v_wanted = λ (ẋ_l + ẍ_l / 2ω + ω/2 (x_l - x)) + (1 - λ) ω/2 (x_t - x): on the lead's way, and λ = 1, the
+    /// acceleration is ẍ_l.
+    pub fn follow_led(&mut self, target: &Isometry3<f64>, lead: Option<&Lead>, dt_s: f64) {
+        self.move_on(dt_s);
         let RateLimits { speed_m_s, acceleration_m_s2, turn_rad_s, turn_acceleration_rad_s2 } = self.limits;
+        let omega = self.omega;
         let PoseReference { point, rotation } = &mut self.reference;
         let error = target.translation.vector - point.position;
-        point.acceleration = step(&error, &point.velocity, self.omega, speed_m_s, acceleration_m_s2);
-        point.velocity += point.acceleration * dt_s;
-        point.position += point.velocity * dt_s;
+        let turn = (target.rotation * rotation.orientation.inverse()).scaled_axis();
+        let mut wanted = closing(&error, omega, acceleration_m_s2);
+        let mut wanted_turn = closing(&turn, omega, turn_acceleration_rad_s2);
+        if let Some(Lead { motion, share }) = lead {
+            let (on, by) = (&motion.point, &motion.rotation);
+            let error = on.position - point.position;
+            let turn = (by.orientation * rotation.orientation.inverse()).scaled_axis();
+            let along = on.velocity + on.acceleration / (2.0 * omega);
+            let turning = by.angular_velocity + by.angular_acceleration / (2.0 * omega);
+            wanted = wanted.lerp(&(along + closing(&error, omega, acceleration_m_s2)), *share);
+            wanted_turn =
+                wanted_turn.lerp(&(turning + closing(&turn, omega, turn_acceleration_rad_s2)), *share);
+        }
+        point.acceleration = acceleration(&wanted, &point.velocity, omega, speed_m_s, acceleration_m_s2);
+        rotation.angular_acceleration = acceleration(
+            &wanted_turn,
+            &rotation.angular_velocity,
+            omega,
+            turn_rad_s,
+            turn_acceleration_rad_s2,
+        );
+    }
 
-        let error = (target.rotation * rotation.orientation.inverse()).scaled_axis();
-        rotation.angular_acceleration =
-            step(&error, &rotation.angular_velocity, self.omega, turn_rad_s, turn_acceleration_rad_s2);
-        rotation.angular_velocity += rotation.angular_acceleration * dt_s;
-        rotation.orientation =
-            UnitQuaternion::from_scaled_axis(rotation.angular_velocity * dt_s) * rotation.orientation;
+    /// By one step, at the acceleration of the last one.
+    fn move_on(&mut self, dt_s: f64) {
+        let PoseReference { point, rotation } = &mut self.reference;
+        point.position += (point.velocity + point.acceleration * (dt_s / 2.0)) * dt_s;
+        point.velocity += point.acceleration * dt_s;
+        let turn = (rotation.angular_velocity + rotation.angular_acceleration * (dt_s / 2.0)) * dt_s;
+        rotation.orientation = UnitQuaternion::from_scaled_axis(turn) * rotation.orientation;
         rotation.orientation.renormalize();
+        rotation.angular_velocity += rotation.angular_acceleration * dt_s;
     }
 }
 
@@ -82,6 +135,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::trajectory::Segment;
 
     const DT_S: f64 = 0.0025;
     const LIMITS: RateLimits = RateLimits {
@@ -133,6 +187,28 @@ mod tests {
                 let now = sut.reference().point.position.x;
                 prop_assert!(now >= last - 1e-5, "{} after {}", now, last);
                 last = now;
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_lead_within_the_limits_is_followed_exactly(
+            to in prop::array::uniform3(-0.1..0.1f64), turn in prop::array::uniform3(-0.5..0.5f64),
+        ) {
+            let mut sut = sut();
+            let segment = Segment::new(&Isometry3::identity(), &Isometry3::new(to.into(), turn.into()), 2.0);
+            for tick in 0..1000 {
+                let motion = segment.sample(f64::from(tick) * DT_S);
+                // Whatever the target is: with all of the share it does not count.
+                sut.follow_led(&Isometry3::identity(), Some(&Lead { motion, share: 1.0 }), DT_S);
+                let PoseReference { point, rotation } = sut.reference();
+                prop_assert!((point.position - motion.point.position).norm() < 1e-5);
+                prop_assert!((point.velocity - motion.point.velocity).norm() < 1e-3);
+                prop_assert!((point.acceleration - motion.point.acceleration).norm() < 1e-2);
+                prop_assert!(rotation.orientation.angle_to(&motion.rotation.orientation) < 1e-5);
+                let turning = rotation.angular_velocity - motion.rotation.angular_velocity;
+                prop_assert!(turning.norm() < 5e-3);
             }
         }
     }

@@ -14,6 +14,7 @@ use crate::{
     joints::{JointVector, Side},
     kinematics::torso_from_frame,
     model::Frame,
+    trajectory::{Player, Sample},
 };
 
 /// What comes from the operator in one control step.
@@ -35,6 +36,8 @@ pub struct Driving {
     gripper: DrivenBody,
     gripper_start: Vector3<f64>,
     reach: Reach,
+    /// What moves torso and gripper in place of the operator's displacements.
+    player: Option<Player>,
     opening: [f64; 2],
     opening_goal: [f64; 2],
 }
@@ -48,6 +51,7 @@ impl Driving {
             gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
             gripper_start: Vector3::zeros(),
             reach: Reach::new(Side::Right, posture, limits.reach),
+            player: None,
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             limits,
@@ -87,10 +91,11 @@ impl Driving {
         scene: &Scene<'_>,
         setpoint: &mut Setpoint,
     ) {
-        self.listen(side, operator, scene.now_ns);
-        self.move_torso(side.is_some(), scene, setpoint);
+        self.listen(side, operator, scene);
+        let played = self.player.as_ref().map(Player::sample);
+        self.move_torso(side.is_some(), played.as_ref(), scene, setpoint);
         if let Some(side) = side {
-            self.move_gripper(side, scene, setpoint);
+            self.move_gripper(side, played.as_ref(), scene, setpoint);
         }
     }
 
@@ -102,23 +107,31 @@ impl Driving {
         }
     }
 
-    fn listen(&mut self, side: Option<Side>, operator: &Operator<'_>, now_ns: u64) {
+    fn listen(&mut self, side: Option<Side>, operator: &Operator<'_>, scene: &Scene<'_>) {
         let Some((command, grip)) = operator.command else { return self.release() };
+        if let Some(player) = &mut self.player {
+            player.advance(grip == Grip::Holds, scene.dt_s);
+        }
         match grip {
             Grip::Frozen => return,
             Grip::Released => return self.release(),
             Grip::Begins => {
                 self.torso.engage();
                 self.gripper.engage();
+                self.player = command.trajectory.as_ref().map(Player::new);
             }
             Grip::Resumes => self.release(),
             Grip::Holds if !operator.fresh => return,
             Grip::Holds => {}
         }
-        self.torso.displace(command.torso.as_ref(), operator.clock, now_ns);
+        if command.trajectory.is_some() {
+            // Played from the beginning of its engagement or not at all: never from half-way.
+            return;
+        }
+        self.torso.displace(command.torso.as_ref(), operator.clock, scene.now_ns);
         if let Some(side) = side {
             let (palm, opening) = (command.palms[side.index()], command.opening[side.index()]);
-            self.gripper.displace(palm.as_ref(), operator.clock, now_ns);
+            self.gripper.displace(palm.as_ref(), operator.clock, scene.now_ns);
             self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
         }
     }
@@ -126,36 +139,61 @@ impl Driving {
     fn release(&mut self) {
         self.torso.release();
         self.gripper.release();
+        self.player = None;
     }
 
     /// The torso, within its range, with the centre of mass over the feet.
-    fn move_torso(&mut self, manipulating: bool, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+    fn move_torso(
+        &mut self,
+        manipulating: bool,
+        played: Option<&Sample>,
+        scene: &Scene<'_>,
+        setpoint: &mut Setpoint,
+    ) {
         let range = if manipulating { self.limits.gripper_torso } else { self.limits.stance_torso };
         let margin_m = self.limits.support_margin_m;
         let (feet, count) = scene.standing_feet(&setpoint.contacts);
         let com_from_torso = from_above(&(scene.com - scene.state.world_from_torso.translation.vector));
-        self.torso.advance(scene.now_ns, scene.dt_s, |wanted| {
+        let permitted = |wanted: &Isometry3<f64>| {
             let mut pose = range.clamp(wanted);
             let com = from_above(&pose.translation.vector) + com_from_torso;
             let push = push_inside(&com, &feet[..count], margin_m);
             pose.translation.vector += Vector3::new(push.x, push.y, 0.0);
             pose
-        });
+        };
+        match played {
+            Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
+            None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
+        }
         setpoint.torso = *self.torso.reference();
     }
 
     /// The gripper, within its box, above the ground, within reach.
-    fn move_gripper(&mut self, side: Side, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+    fn move_gripper(
+        &mut self,
+        side: Side,
+        played: Option<&Sample>,
+        scene: &Scene<'_>,
+        setpoint: &mut Setpoint,
+    ) {
         let outward = if side == Side::Left { 1.0 } else { -1.0 };
         let (limits, start) = (self.limits.gripper, self.gripper_start);
         let lowest = self.lowest_gripper(side, scene, setpoint);
         let (reach, world_from_torso) = (&mut self.reach, setpoint.torso.pose());
-        self.gripper.advance(scene.now_ns, scene.dt_s, |wanted| {
+        let permitted = |wanted: &Isometry3<f64>| {
             let mut position = limits.clamp(&wanted.translation.vector, &start, outward);
             position.z = position.z.max(lowest);
             let inside = Isometry3::from_parts(position.into(), wanted.rotation);
             world_from_torso * reach.nearest(scene.model, &world_from_torso.inv_mul(&inside))
-        });
+        };
+        match played {
+            Some(sample) => {
+                let place = side.index();
+                self.opening_goal[place] = sample.opening[place].unwrap_or(self.opening_goal[place]);
+                self.gripper.advance_along(&sample.limbs[place], scene.dt_s, permitted);
+            }
+            None => self.gripper.advance(scene.now_ns, scene.dt_s, permitted),
+        }
         setpoint.arms[side.index()] = ArmGoal::Gripper(*self.gripper.reference());
     }
 

@@ -4,8 +4,10 @@
 
 pub mod demo;
 pub mod drive;
+pub mod lockstep;
 pub mod report;
 pub mod statistics;
+pub mod tracking;
 pub mod vision;
 
 use std::path::{Path, PathBuf};
@@ -37,6 +39,8 @@ pub enum Experiment {
         #[arg(long, value_name = "SESSION")]
         recording: PathBuf,
     },
+    /// The paper's tracking tasks and its square, against the estimator and against the truth.
+    Tracking(tracking::Args),
 }
 
 /// Runs `locoman-sim eval`.
@@ -45,6 +49,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let report = match &args.experiment {
         Experiment::Vision => vision::run(configs, args.seed, plot.as_deref())?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
+        Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,
     };
     report.finish(args.json.as_deref())
 }

@@ -136,6 +136,7 @@ impl Session {
             opening: [None; 2],
             mode_request: 0,
             mode: None,
+            trajectory: None,
         });
         self.run(0.05);
     }
