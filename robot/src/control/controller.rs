@@ -1,6 +1,7 @@
 //! One control step.
 
 use super::{
+    compensation::Compensation,
     posture,
     requests::RequestLog,
     settings::RobotConfig,
@@ -47,6 +48,7 @@ pub struct Controller {
     pub(super) machine: Machine,
     pub(super) choreography: Choreography,
     pub(super) wbc: WholeBodyController,
+    pub(super) compensation: Compensation,
     pub(super) output: WbcOutput,
     pub(super) engagement: Engagement,
     pub(super) requests: RequestLog,
@@ -78,6 +80,7 @@ impl Controller {
             machine: Machine::default(),
             choreography: Choreography::new(control.poses, control.motions, config.limits),
             wbc: WholeBodyController::new(config.wbc),
+            compensation: Compensation::new(control.compensation),
             output: WbcOutput::hold(posture),
             engagement: Engagement::default(),
             requests: RequestLog::default(),
@@ -213,6 +216,7 @@ impl Controller {
         let contacts = lifted.map_or(ContactSet::STANCE, |side| ContactSet::without(side.leg()));
         self.estimator.reset(&self.config.model, sensors, &contacts);
         self.output = WbcOutput::hold(sensors.position);
+        self.compensation.restart();
         let state = self.estimator.state(sensors);
         let scene = scene(&self.config, &state, &self.desired, &self.wbc, sensors, now_ns, self.dt_s);
         self.choreography.take_up(&scene, lifted);
@@ -308,7 +312,15 @@ impl Controller {
                 );
                 let WbcOutput { position, velocity, torque, .. } = self.output;
                 let (kp, kd) = JointGains::vectors(gains.balance_kp, gains.balance_kd);
-                JointCommand { position, velocity, torque, kp, kd, opening }
+                let mut command = JointCommand { position, velocity, torque, kp, kd, opening };
+                self.compensation.apply(
+                    &self.config.model,
+                    &(position - state.position),
+                    &setpoint.contacts,
+                    self.dt_s,
+                    &mut command,
+                );
+                command
             }
         };
         if command.is_finite() { command } else { JointCommand::damping() }

@@ -1,12 +1,13 @@
 //! The control loop, without its I/O.
 //!
 //! ```text
-//! Sensors ──► estimator ──► supervisor ──► machine ──► choreography ──► WBC ──► JointCommand
-//! Command ────────────────────▲──────────────▲──────────────▲              └──► Snapshot
+//! Sensors ──► estimator ──► supervisor ──► machine ──► choreography ──► WBC ──► compensation ──► JointCommand
+//! Command ────────────────────▲──────────────▲──────────────▲                                └──► Snapshot
 //! ```
 //! [`Controller`] is the same in the real loop, in lockstep tests and in replay: it has no clock, takes no
 //! lock, does no I/O and allocates nothing.
 
+mod compensation;
 mod controller;
 mod posture;
 mod report;
@@ -17,6 +18,7 @@ mod snapshot;
 mod timing;
 mod watch;
 
+pub use compensation::{Compensation, CompensationSettings, LearningSettings};
 pub use controller::{Controller, Inputs, Options};
 pub use run::{Wish, run};
 pub use settings::{ConfigError, ControlSettings, RobotConfig};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, de::DeserializeOwned};
 
+use super::CompensationSettings;
 use crate::{
     commander::Limits,
     estimator::EstimatorSettings,
@@ -25,6 +26,8 @@ pub struct ControlSettings {
     pub motions: MotionSettings,
     /// Joint-level gains.
     pub gains: JointGains,
+    /// What the joints learn.
+    pub compensation: CompensationSettings,
 }
 
 /// Everything that the controller is made from.
