@@ -1,17 +1,13 @@
-//! The simulated robot in lockstep: stands, is deterministic, respects its motors, agrees with the model.
+//! The simulated robot in lockstep: stands, is deterministic, respects its motors.
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use std::path::{Path, PathBuf};
 
-use locoman_robot::dynamics::{DOF, Dynamics, MassMatrix, State};
-use locoman_robot::joints::{JointVector, Leg, Side};
-use locoman_robot::model::{Frame, JOINT_NAMES, Model};
+use locoman_robot::joints::JointVector;
+use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Plant, Sensors};
 use locoman_sim::robot::{Disturbance, LockstepPlant, Options};
-use mujoco_rs::prelude::MjtObjBase;
-use nalgebra::{Isometry3, Vector3, Vector6};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use nalgebra::Vector3;
 
 fn configs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs")
@@ -48,6 +44,11 @@ fn run(plant: &mut LockstepPlant, command: &JointCommand, seconds: f64) -> Senso
     last.unwrap()
 }
 
+/// Of the simulated robot, kg.
+fn mass(sut: &mut LockstepPlant) -> f64 {
+    sut.robot_mut().world_mut().data_mut().model().body_mass().iter().sum()
+}
+
 #[test]
 fn the_robot_stands_by_joint_control_alone() {
     let mut sut = plant("hw", "standing", 1);
@@ -57,8 +58,7 @@ fn the_robot_stands_by_joint_control_alone() {
     let height = truth.world_from_torso.translation.z;
     assert!((0.25..0.30).contains(&height), "{height}");
     let weight: f64 = truth.foot_force_n.iter().sum();
-    let model = Model::load(&configs().join("robot")).unwrap();
-    let expected = (model.mass() + 0.08 * model.torso.mass) * 9.81;
+    let expected = mass(&mut sut) * 9.81;
     assert!((weight - expected).abs() < 0.02 * expected, "{weight} N on the feet, {expected} N expected");
     assert!((Vector3::from(sensors.accelerometer).norm() - 9.81).abs() < 0.3);
     assert_eq!(sensors.time_ns, 2_000_000_000);
@@ -126,14 +126,18 @@ fn torques_stay_within_the_motors_limits() {
 fn a_command_takes_effect_after_the_latency_of_the_profile() {
     let mut kick = stand(0.0);
     kick.torque[3] = 10.0;
-    let first_moves = |profile: &str| {
+    let acts = |profile: &str, sent_after_ns: u64| {
         let mut sut = plant(profile, "standing", 1);
         run(&mut sut, &stand(0.0), 0.5);
-        sut.exchange(&kick).unwrap();
-        sut.robot_mut().applied_torques()[3] > 5.0
+        let robot = sut.robot_mut();
+        robot.send(&kick, sent_after_ns);
+        robot.advance().unwrap();
+        robot.applied_torques()[3] > 5.0
     };
-    assert!(first_moves("ideal"));
-    assert!(!first_moves("hw"), "2.5 ms late");
+    // An exchange lasts 2.5 ms, its last step begins at 2 ms.
+    assert!(acts("ideal", 2_000_000));
+    assert!(acts("hw", 0), "2 ms late");
+    assert!(!acts("hw", 1), "later than the last step");
 }
 
 #[test]
@@ -179,71 +183,6 @@ fn a_hard_push_topples_the_robot_and_a_soft_one_does_not() {
 fn the_ideal_robot_weighs_what_the_model_says() {
     let model = Model::load(&configs().join("robot")).unwrap();
     let mut sut = plant("ideal", "standing", 1);
-    let mass: f64 = sut.robot_mut().world_mut().data_mut().model().body_mass().iter().sum();
+    let mass = mass(&mut sut);
     assert!((mass - model.mass()).abs() < 1e-9 * mass, "{mass} and {}", model.mass());
-}
-
-/// The simulator's mass matrix in the coordinates of the controller: MuJoCo's free joint has the linear
-/// velocity along the world's axes, ours along the torso's.
-fn mass_matrix_of(sut: &mut LockstepPlant, state: &State) -> MassMatrix {
-    let data = sut.robot_mut().world_mut().data_mut();
-    let model = data.model_clone();
-    let joint = |name: &str| model.name_to_id(MjtObjBase::mjOBJ_JOINT, name).unwrap();
-    data.reset();
-    let pose = &state.world_from_torso;
-    let [i, j, k, w]: [f64; 4] = pose.rotation.coords.into();
-    let qpos = data.qpos_mut();
-    qpos[..3].copy_from_slice(pose.translation.vector.as_slice());
-    qpos[3..7].copy_from_slice(&[w, i, j, k]);
-    let mut at = [0; DOF];
-    at[..6].copy_from_slice(&[0, 1, 2, 3, 4, 5]);
-    for (place, name) in JOINT_NAMES.iter().enumerate() {
-        qpos[model.jnt_qposadr()[joint(name)] as usize] = state.position[place];
-        at[6 + place] = model.jnt_dofadr()[joint(name)] as usize;
-    }
-    data.forward();
-    let size = model.nv() as usize;
-    let mut full = vec![0.0; size * size];
-    data.full_m(&mut full).unwrap();
-    let raw = MassMatrix::from_fn(|row, column| full[at[row] * size + at[column]]);
-    let mut ours_to_theirs = MassMatrix::identity();
-    let rotation = pose.rotation.to_rotation_matrix();
-    ours_to_theirs.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
-    ours_to_theirs.transpose() * raw * ours_to_theirs
-}
-
-#[test]
-fn simulator_and_controller_have_the_same_masses_inertias_and_frames() {
-    let model = Model::load(&configs().join("robot")).unwrap();
-    let mut sut = plant("ideal", "standing", 1);
-    let mut dynamics = Dynamics::new();
-    let mut random = ChaCha8Rng::seed_from_u64(2);
-    for _ in 0..50 {
-        let mut draw = || random.random::<f64>() - 0.5;
-        let state = State {
-            world_from_torso: Isometry3::new(
-                Vector3::from_fn(|_, _| draw()),
-                Vector3::from_fn(|_, _| 4.0 * draw()),
-            ),
-            torso_twist: Vector6::zeros(),
-            position: model.lower
-                + (model.upper - model.lower).component_mul(&JointVector::from_fn(|_, _| 0.5 + draw())),
-            velocity: JointVector::zeros(),
-        };
-        dynamics.update(&model, &state);
-        let theirs = mass_matrix_of(&mut sut, &state);
-        let worst = (theirs - dynamics.mass_matrix()).amax() / theirs.amax();
-        // Both are exact; MuJoCo's principal axes of the inertias cost some digits.
-        assert!(worst < 1e-9, "{worst}");
-        let truth = sut.truth();
-        for side in Side::ALL {
-            let ours = dynamics.frame(Frame::Gripper(side)).world_from_frame;
-            let difference = ours.inverse() * truth.world_from_gripper[side.index()];
-            assert!(difference.translation.vector.norm() < 1e-9 && difference.rotation.angle() < 1e-7);
-        }
-        for leg in Leg::ALL {
-            let ours = dynamics.frame(Frame::Foot(leg)).world_from_frame.translation.vector;
-            assert!((ours - truth.feet_in_world[leg.index()].coords).norm() < 1e-9);
-        }
-    }
 }

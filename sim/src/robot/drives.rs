@@ -1,12 +1,15 @@
 //! The joint law and what the motors can really do.
 //!
 //! `tau = tau_ff + kp (q_des - q) + kd (dq_des - dq)`, then limited by the drive's torque and by its speed:
-//! near the no-load speed no torque is left in the direction of motion, braking stays possible.
+//! near the no-load speed no torque is left in the direction of motion, braking stays possible. The arms'
+//! servos have a law of their own ([`super::servo`]).
 
 use locoman_robot::joints::JOINTS;
 use locoman_robot::plant::JointCommand;
 
+use super::profile::Profile;
 use super::scene::{ArmServo, Gripper, LegDrive, Scene};
+use super::servo::Servos;
 use super::world::{MOTORS, World};
 
 /// Torque limits of one motor.
@@ -40,22 +43,21 @@ impl Motor {
 pub struct Drives {
     leg: [Motor; 3],
     arm: Motor,
-    arm_kp: [f64; 3],
-    arm_kd: [f64; 3],
+    servos: Servos,
     gripper: Gripper,
     jaw: Motor,
 }
 
 impl Drives {
-    /// From the scene.
-    pub fn new(scene: &Scene) -> Self {
+    /// From the scene; `seed` is that of the servos' encoder noise.
+    pub fn new(scene: &Scene, profile: &Profile, seed: u64) -> Self {
         let LegDrive { torque_limit_nm, no_load_speed_rad_s, full_torque_speed_share, .. } = &scene.leg;
         let leg = std::array::from_fn(|joint| Motor {
             torque_nm: torque_limit_nm[joint],
             no_load_speed_rad_s: no_load_speed_rad_s[joint],
             full_torque_speed_share: *full_torque_speed_share,
         });
-        let ArmServo { torque_limit_nm, no_load_speed_rad_s, kp, kd, .. } = &scene.arm;
+        let ArmServo { torque_limit_nm, no_load_speed_rad_s, .. } = &scene.arm;
         let servo = |torque_nm, no_load_speed_rad_s| Motor {
             torque_nm,
             no_load_speed_rad_s,
@@ -64,35 +66,32 @@ impl Drives {
         Self {
             leg,
             arm: servo(*torque_limit_nm, *no_load_speed_rad_s),
-            arm_kp: *kp,
-            arm_kd: *kd,
+            servos: Servos::new(&scene.arm, &profile.servos, scene.physics.timestep_s, seed),
             jaw: servo(scene.gripper.torque_limit_nm, scene.gripper.no_load_speed_rad_s),
             gripper: scene.gripper.clone(),
         }
     }
 
-    /// Motor torques for the present state under a command.
-    pub fn torques(&self, command: &JointCommand, world: &World) -> [f64; MOTORS] {
+    /// Motor torques for the present state under a command; to be called once a step.
+    pub fn torques(&mut self, command: &JointCommand, world: &World) -> [f64; MOTORS] {
+        self.servos.exchange(command, world);
         std::array::from_fn(|motor| {
-            let (angle, speed) = (world.angle(motor), world.speed(motor));
+            let (angle, speed) = (world.angle(motor), world.motor_speed(motor));
             match motor {
                 0..12 => self.leg[motor % 3].limited(joint_law(command, motor, angle, speed), speed),
-                12..JOINTS => self.arm.limited(self.servo_law(command, motor, angle, speed), speed),
+                // A servo follows positions with its own gains unless the command brings some: damping.
+                12..JOINTS if command.kp[motor] > 0.0 || command.kd[motor] > 0.0 => {
+                    self.arm.limited(joint_law(command, motor, angle, speed), speed)
+                }
+                12..JOINTS => self.servos.torque(motor - 12, speed),
                 _ => self.jaw.limited(self.jaw_law(command.opening[motor - JOINTS], angle, speed), speed),
             }
         })
     }
 
-    /// A servo follows positions with its own gains unless the command brings some. Feed-forward acts as an
-    /// offset of the position goal by `tau / kp`, which is what a driver can do with a position servo.
-    fn servo_law(&self, command: &JointCommand, joint: usize, angle: f64, speed: f64) -> f64 {
-        if command.kp[joint] > 0.0 || command.kd[joint] > 0.0 {
-            return joint_law(command, joint, angle, speed);
-        }
-        let place = joint % 3;
-        command.torque[joint]
-            + self.arm_kp[place] * (command.position[joint] - angle)
-            + self.arm_kd[place] * (command.velocity[joint] - speed)
+    /// The arms' servos.
+    pub fn servos_mut(&mut self) -> &mut Servos {
+        &mut self.servos
     }
 
     fn jaw_law(&self, opening: f64, angle: f64, speed: f64) -> f64 {

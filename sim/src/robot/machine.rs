@@ -1,8 +1,8 @@
 //! The simulated robot as a machine: commands in, sensors out, one exchange of 2.5 ms at a time.
 //!
 //! ```text
-//! command ─► latency ─► latched ─► joint law and motor limits ─► MuJoCo ─► noise ─► sensors
-//!                                  └──────── every step (2 kHz) ───────┘
+//! command ─► wire, latency ─► latched ─► joint law and motor limits ─► MuJoCo ─► noise ─► sensors
+//!                                        └──────── every step (2 kHz) ───────┘
 //! ```
 //! The last command stays in force for ever, as on the Go1. Lockstep and real time differ only in who says
 //! when to advance.
@@ -10,7 +10,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use locoman_robot::joints::{JointVector, Leg, Side};
+use locoman_robot::joints::{JOINTS, JointVector, Leg, Side};
 use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Sensors};
 use nalgebra::Vector3;
@@ -18,9 +18,10 @@ use nalgebra::Vector3;
 use super::disturbance::{Disturbance, Target};
 use super::drives::Drives;
 use super::noise::SensorNoise;
+use super::profile::Profile;
 use super::scene::{Posture, Scene};
 use super::world::{MOTORS, Truth, World};
-use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, mjcf};
+use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, body, go1_wire, mjcf};
 
 /// Commands that can be under way at once: more than arrive within the longest latency.
 const COMMANDS_UNDER_WAY: usize = 64;
@@ -50,7 +51,7 @@ pub struct SimRobot {
     noise: SensorNoise,
     scene: Scene,
     seed: u64,
-    profile: String,
+    profile: Profile,
     steps_per_exchange: u64,
     latency_steps: u64,
     /// Commands that have not come into force, with the step at which they do.
@@ -77,17 +78,18 @@ impl SimRobot {
 
     /// The same with a given model and scene.
     pub fn with_model(model: &Model, scene: Scene, options: &Options) -> Result<Self, SimRobotError> {
-        let profile = scene.profile(&options.profile)?;
-        let world = World::new(&mjcf::write(model, &scene, profile)?)?;
+        let profile = *scene.profile(&options.profile)?;
+        let robot = body::built(model, &profile.body, options.seed);
+        let world = World::new(&mjcf::write(&robot, &scene, &profile)?, &profile.feet)?;
         let steps = |seconds: f64| (seconds / scene.physics.timestep_s).round() as u64;
         let mut robot = Self {
             world,
-            drives: Drives::new(&scene),
-            noise: SensorNoise::new(profile, options.seed),
+            drives: Drives::new(&scene, &profile, options.seed),
+            noise: SensorNoise::new(&profile.sensors, options.seed),
             steps_per_exchange: steps(EXCHANGE_S),
-            latency_steps: steps(profile.command_latency_s),
+            latency_steps: steps(profile.commands.latency_s),
             seed: options.seed,
-            profile: options.profile.clone(),
+            profile,
             scene,
             under_way: VecDeque::with_capacity(COMMANDS_UNDER_WAY),
             latched: JointCommand::damping(),
@@ -105,7 +107,8 @@ impl SimRobot {
     /// Starts again from a posture, with the noise of the seed: the same as a new robot.
     pub fn reset(&mut self, posture: &str) -> Result<(), SimRobotError> {
         let posture = self.scene.posture(posture)?.clone();
-        self.noise = SensorNoise::new(self.scene.profile(&self.profile)?, self.seed);
+        self.noise = SensorNoise::new(&self.profile.sensors, self.seed);
+        self.drives = Drives::new(&self.scene, &self.profile, self.seed);
         self.under_way.clear();
         self.push_until = [0; Target::COUNT];
         self.silent_until = 0;
@@ -134,7 +137,8 @@ impl SimRobot {
             // Faster than any latency allows for: the oldest comes into force early.
             self.apply_next();
         }
-        self.under_way.push_back((arrival + self.latency_steps, *command));
+        let carried = if self.profile.commands.go1_wire { go1_wire::command(command) } else { *command };
+        self.under_way.push_back((arrival + self.latency_steps, carried));
     }
 
     /// Advances by one exchange and measures.
@@ -247,16 +251,26 @@ impl SimRobot {
     }
 
     fn measure(&mut self) -> Sensors {
-        let torque = JointVector::from_fn(|joint, _| self.applied[joint]);
-        let time_s = self.time_s();
-        let attitude = self.noise.attitude(self.world.attitude(), time_s);
+        let mut position = self.world.joint_position();
+        let mut velocity = self.world.joint_velocity();
+        let mut torque = JointVector::from_fn(|joint, _| self.applied[joint]);
+        for joint in 0..12 {
+            position[joint] = self.noise.leg_position(position[joint]);
+            velocity[joint] = self.noise.leg_velocity(velocity[joint]);
+            torque[joint] = self.noise.leg_torque(torque[joint]);
+        }
+        for joint in 12..JOINTS {
+            let reading = self.drives.servos_mut().reading(joint - 12, &self.world);
+            (position[joint], velocity[joint]) = (reading.position, reading.velocity);
+            torque[joint] = self.noise.arm_torque(torque[joint]);
+        }
         Sensors {
             time_ns: self.time_ns(),
-            position: self.noise.position(&self.world.joint_position()),
-            velocity: self.noise.velocity(&self.world.joint_velocity()),
-            torque: self.noise.torque(&torque),
+            position,
+            velocity,
+            torque,
             opening: self.opening(),
-            attitude: [attitude.w, attitude.i, attitude.j, attitude.k],
+            attitude: self.noise.attitude(self.world.attitude(), self.time_s()),
             gyro: self.noise.gyro(self.world.angular_velocity()).into(),
             accelerometer: self.noise.accelerometer(self.world.specific_force()).into(),
             foot_force: self.noise.foot_force(self.world.foot_force()),

@@ -11,7 +11,8 @@ use nalgebra::Vector3;
 
 use super::SimRobotError;
 use super::jaws::{JAW_RADIUS_M, Jaw, without};
-use super::scene::{Profile, Scene};
+use super::profile::Profile;
+use super::scene::Scene;
 use super::shapes::{Part, Shape, shapes};
 
 /// The jaw that each gripper's servo turns; its partner (`…_partner`) is geared to it.
@@ -22,6 +23,10 @@ pub const FOOT_NAMES: [&str; 4] = ["FR_foot", "FL_foot", "RR_foot", "RL_foot"];
 pub const GRIPPER_NAMES: [&str; 2] = ["right_gripper", "left_gripper"];
 /// Bodies without mass at the grasp frames: where loads are held and pushes act.
 pub const GRASP_NAMES: [&str; 2] = ["right_grasp", "left_grasp"];
+/// Ending of the names of the servos' rotors, which stand for motor and gears where there is play.
+pub const ROTOR: &str = "_rotor";
+/// The first joint that has a servo.
+const ARMS_FROM: usize = 12;
 /// The trunk's body.
 pub const TRUNK: &str = "trunk";
 /// The ground's geom.
@@ -40,6 +45,8 @@ const LEG_BITS: ContactBits = ContactBits { is: 0, touches: 1 };
 const ARM_BITS: [ContactBits; 2] =
     [ContactBits { is: 4, touches: 1 | 2 }, ContactBits { is: 8, touches: 1 | 2 | 4 }];
 
+/// As stiff as MuJoCo allows: by default its dry friction gives way like honey, and no joint ever sticks.
+const JOINT_FRICTION: &str = r#"solreffriction="0.001 1" solimpfriction="0.9999 0.9999 0.001""#;
 /// Where a foot touches, its own parameters count and not those of what it touches.
 const FOOT_CONTACT: &str = r#" priority="1""#;
 
@@ -77,7 +84,7 @@ impl Writer<'_> {
 <compiler angle="radian" autolimits="true"/>
 <option timestep="{}" integrator="implicitfast" cone="elliptic" impratio="{}" gravity="0 0 -9.81">
 <flag autoreset="disable"/></option>
-<default><geom friction="{} 0.005 0.0001" solref="{} 1" condim="3"/><joint solreflimit="0.01 1"/></default>
+<default><geom friction="{} 0.005 0.0001" solref="{} 1" condim="3"/><joint solreflimit="0.01 1" {JOINT_FRICTION}/></default>
 <worldbody>
 <geom name="{GROUND}" type="plane" size="0 0 1" {}/>"#,
             physics.timestep_s,
@@ -88,28 +95,46 @@ impl Writer<'_> {
         );
         self.line(head);
         self.trunk();
-        self.line("</worldbody>\n<equality>");
+        self.line("</worldbody>");
+        self.play();
+        self.line("<equality>");
         for jaw in JAW_NAMES {
             self.line(format!(r#"<joint joint1="{jaw}_partner" joint2="{jaw}" polycoef="0 1 0 0 0"/>"#));
         }
         self.line("</equality>\n<actuator>");
-        for joint in JOINT_NAMES.iter().chain(&JAW_NAMES) {
-            self.line(format!(r#"<motor joint="{joint}"/>"#));
+        for (index, joint) in JOINT_NAMES.iter().chain(&JAW_NAMES).enumerate() {
+            let has_rotor = (ARMS_FROM..JOINTS).contains(&index) && self.plays();
+            self.line(format!(r#"<motor joint="{joint}{}"/>"#, if has_rotor { ROTOR } else { "" }));
         }
         self.line("</actuator>\n<sensor><accelerometer site=\"imu\"/></sensor>\n</mujoco>");
     }
 
     fn trunk(&mut self) {
-        // A wrong mass is not a wrong shape: the inertia scales with it.
-        let factor = self.profile.trunk_mass_factor;
-        let torso = &self.model.torso;
-        let heavier =
-            RigidBody { mass: factor * torso.mass, com: torso.com, inertia: factor * torso.inertia };
         self.line(format!("<body name=\"{TRUNK}\"><freejoint/><site name=\"imu\"/>"));
-        self.line(inertial(&heavier));
+        self.line(inertial(&self.model.torso));
         self.geoms(TRUNK, Part::Trunk, Side::Right, &Vector3::zeros(), TRUNK_BITS);
         self.children(None);
         self.line("</body>");
+    }
+
+    /// Whether the servos' gears have play.
+    fn plays(&self) -> bool {
+        self.profile.servos.backlash_rad > 0.0
+    }
+
+    /// Play: the difference of rotor and joint is limited. The limits are stiff, for gears are of metal.
+    fn play(&mut self) {
+        if !self.plays() {
+            return;
+        }
+        let half = 0.5 * self.profile.servos.backlash_rad;
+        self.line("<tendon>");
+        for joint in &JOINT_NAMES[ARMS_FROM..] {
+            self.line(format!(
+                r#"<fixed name="{joint}_play" limited="true" range="-{half} {half}" solreflimit="0.002 1" solimplimit="0.99 0.999 0.0005"><joint joint="{joint}{ROTOR}" coef="1"/><joint joint="{joint}" coef="-1"/></fixed>"#
+            ));
+        }
+        self.line("</tendon>");
     }
 
     fn children(&mut self, parent: Option<usize>) {
@@ -125,17 +150,24 @@ impl Writer<'_> {
         let Joint { parent_from_joint, axis, body } = &model.joints[index];
         let name = JOINT_NAMES[index];
         let place = numbers(parent_from_joint.translation.vector.as_slice());
-        self.line(format!(r#"<body name="{name}" pos="{place}">"#));
-        let (damping, friction) = match index {
-            0..12 => (self.scene.leg.damping, self.profile.leg_friction_nm),
-            _ => (self.scene.arm.damping, self.profile.arm_friction_nm),
-        };
+        let axis = numbers(axis.as_slice());
+        let friction = self.profile.joints;
+        let mut coulomb = friction.arm_coulomb_nm + friction.arm_bearing_nm;
+        let (mut viscous, mut armature) = (0.0, model.armature[index]);
+        if index < ARMS_FROM {
+            (viscous, coulomb) = (friction.leg_viscous_nm_s, friction.leg_coulomb_nm);
+        } else if self.plays() {
+            // The motor and its gears, up to the play: a wheel on the joint's axis, as good as massless.
+            self.line(format!(
+                r#"<body name="{name}{ROTOR}" pos="{place}"><joint name="{name}{ROTOR}" axis="{axis}" armature="{armature}" frictionloss="{}"/><inertial mass="1e-6" pos="0 0 0" diaginertia="1e-9 1e-9 1e-9"/></body>"#,
+                friction.arm_coulomb_nm
+            ));
+            (coulomb, armature) = (friction.arm_bearing_nm, 0.0);
+        }
         self.line(format!(
-            r#"<joint name="{name}" axis="{}" range="{} {}" armature="{}" damping="{damping}" frictionloss="{friction}"/>"#,
-            numbers(axis.as_slice()),
+            r#"<body name="{name}" pos="{place}"><joint name="{name}" axis="{axis}" range="{} {}" armature="{armature}" damping="{viscous}" frictionloss="{coulomb}"/>"#,
             model.lower[index],
             model.upper[index],
-            model.armature[index],
         ));
         match index {
             0..12 => self.leg_link(Leg::ALL[index / 3], index % 3, body),

@@ -5,18 +5,22 @@
 //! configs/scenes/robot.toml ───────┴─────────────────────────┴──► noise ──┘        (tests)  (UDP, Zenoh)
 //! ```
 
+pub mod body;
 pub mod command;
 pub mod disturbance;
 pub mod drives;
 mod error;
+pub mod go1_wire;
 pub mod jaws;
 pub mod lockstep;
 pub mod machine;
 pub mod mjcf;
 pub mod noise;
+pub mod profile;
 pub mod publish;
 pub mod scene;
 pub mod server;
+pub mod servo;
 pub mod shapes;
 pub mod world;
 

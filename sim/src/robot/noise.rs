@@ -1,17 +1,18 @@
 //! What the sensors add to the truth. Deterministic from the seed.
 
-use locoman_robot::joints::JointVector;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::scene::Profile;
+use super::go1_wire::{self, float32};
+use super::profile::SensorErrors;
+use super::servo::rounded;
 
 /// Noise generator and the constants drawn once: biases, scale errors, drift.
 #[derive(Debug, Clone)]
 pub struct SensorNoise {
     random: ChaCha8Rng,
-    profile: Profile,
+    errors: SensorErrors,
     gyro_bias: Vector3<f64>,
     accelerometer_bias: Vector3<f64>,
     tilt_bias: Vector3<f64>,
@@ -21,68 +22,69 @@ pub struct SensorNoise {
 
 impl SensorNoise {
     /// Draws the constants.
-    pub fn new(profile: &Profile, seed: u64) -> Self {
+    pub fn new(errors: &SensorErrors, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let gyro_bias = profile.gyro_bias_rad_s * normal3(&mut random);
-        let accelerometer_bias = profile.accelerometer_bias_m_s2 * normal3(&mut random);
+        let gyro_bias = errors.gyro_bias_rad_s * normal3(&mut random);
+        let accelerometer_bias = errors.accelerometer_bias_m_s2 * normal3(&mut random);
         let tilt_bias =
-            profile.tilt_bias_rad * normal3(&mut random).component_mul(&Vector3::new(1.0, 1.0, 0.0));
-        let yaw_rate = profile.yaw_drift_rad_s * normal(&mut random);
-        let foot_scale = std::array::from_fn(|_| 1.0 + profile.foot_force_scale_error * normal(&mut random));
-        Self {
-            random,
-            profile: profile.clone(),
-            gyro_bias,
-            accelerometer_bias,
-            tilt_bias,
-            yaw_rate,
-            foot_scale,
-        }
+            errors.tilt_bias_rad * normal3(&mut random).component_mul(&Vector3::new(1.0, 1.0, 0.0));
+        let yaw_rate = errors.yaw_drift_rad_s * normal(&mut random);
+        let foot_scale = std::array::from_fn(|_| 1.0 + errors.foot_force_scale_error * normal(&mut random));
+        Self { random, errors: *errors, gyro_bias, accelerometer_bias, tilt_bias, yaw_rate, foot_scale }
     }
 
-    /// Joint angles as the encoders give them.
-    pub fn position(&mut self, truth: &JointVector) -> JointVector {
-        let (leg, arm) = (self.profile.leg_position_noise_rad, self.profile.arm_position_noise_rad);
-        self.noisy(truth, |joint| if joint < 12 { leg } else { arm })
+    /// Leg joint angles as the encoders give them.
+    pub fn leg_position(&mut self, truth: f64) -> f64 {
+        let noisy = truth + self.errors.leg_position_noise_rad * normal(&mut self.random);
+        self.wire(rounded(noisy, self.errors.leg_position_step_rad))
     }
 
-    /// Joint speeds.
-    pub fn velocity(&mut self, truth: &JointVector) -> JointVector {
-        let sigma = self.profile.velocity_noise_rad_s;
-        self.noisy(truth, |_| sigma)
+    /// Leg joint speeds.
+    pub fn leg_velocity(&mut self, truth: f64) -> f64 {
+        let noisy = truth + self.errors.leg_velocity_noise_rad_s * normal(&mut self.random);
+        self.wire(noisy)
     }
 
-    /// Joint torques of the legs as the drives estimate them; the servos' are a tenth as noisy.
-    pub fn torque(&mut self, truth: &JointVector) -> JointVector {
-        let sigma = self.profile.torque_noise_nm;
-        self.noisy(truth, |joint| if joint < 12 { sigma } else { 0.1 * sigma })
+    /// Joint torques of the legs as the drives estimate them.
+    pub fn leg_torque(&mut self, truth: f64) -> f64 {
+        let noisy = truth + self.errors.torque_noise_nm * normal(&mut self.random);
+        if self.errors.go1_wire { go1_wire::torque(noisy) } else { noisy }
+    }
+
+    /// Torques of the servos, by their currents: a tenth as noisy as the legs'.
+    pub fn arm_torque(&mut self, truth: f64) -> f64 {
+        truth + 0.1 * self.errors.torque_noise_nm * normal(&mut self.random)
     }
 
     /// Gyroscope.
     pub fn gyro(&mut self, truth: Vector3<f64>) -> Vector3<f64> {
-        truth + self.gyro_bias + self.profile.gyro_noise_rad_s * normal3(&mut self.random)
+        let noise = self.errors.gyro_noise_rad_s * normal3(&mut self.random);
+        (truth + self.gyro_bias + noise).map(|value| self.wire(value))
     }
 
     /// Accelerometer.
     pub fn accelerometer(&mut self, truth: Vector3<f64>) -> Vector3<f64> {
-        truth + self.accelerometer_bias + self.profile.accelerometer_noise_m_s2 * normal3(&mut self.random)
+        let noise = self.errors.accelerometer_noise_m_s2 * normal3(&mut self.random);
+        (truth + self.accelerometer_bias + noise).map(|value| self.wire(value))
     }
 
-    /// Attitude at a time: tilted by the bias, turned by the yaw's drift, shaken by noise.
-    pub fn attitude(&mut self, truth: UnitQuaternion<f64>, time_s: f64) -> UnitQuaternion<f64> {
-        let shake = self.tilt_bias + self.profile.attitude_noise_rad * normal3(&mut self.random);
+    /// Attitude at a time, w, x, y, z: tilted by the bias, turned by the yaw's drift, shaken by noise.
+    pub fn attitude(&mut self, truth: UnitQuaternion<f64>, time_s: f64) -> [f64; 4] {
+        let shake = self.tilt_bias + self.errors.attitude_noise_rad * normal3(&mut self.random);
         let drift = Vector3::z() * (self.yaw_rate * time_s);
-        UnitQuaternion::from_scaled_axis(drift) * truth * UnitQuaternion::from_scaled_axis(shake)
+        let attitude =
+            UnitQuaternion::from_scaled_axis(drift) * truth * UnitQuaternion::from_scaled_axis(shake);
+        [attitude.w, attitude.i, attitude.j, attitude.k].map(|value| self.wire(value))
     }
 
     /// Foot forces, N.
     pub fn foot_force(&mut self, truth: [f64; 4]) -> [f64; 4] {
-        let sigma = self.profile.foot_force_noise_n;
+        let sigma = self.errors.foot_force_noise_n;
         std::array::from_fn(|foot| self.foot_scale[foot] * truth[foot] + sigma * normal(&mut self.random))
     }
 
-    fn noisy(&mut self, truth: &JointVector, sigma: impl Fn(usize) -> f64) -> JointVector {
-        JointVector::from_fn(|joint, _| truth[joint] + sigma(joint) * normal(&mut self.random))
+    fn wire(&self, value: f64) -> f64 {
+        if self.errors.go1_wire { float32(value) } else { value }
     }
 }
 
@@ -91,7 +93,7 @@ fn normal3(random: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 /// Standard normal by Box and Muller (1958).
-fn normal(random: &mut ChaCha8Rng) -> f64 {
+pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
     let u: f64 = random.random();
     let v: f64 = random.random();
     // `1 - u` is in (0, 1], so the logarithm is finite.

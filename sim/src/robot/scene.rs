@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::SimRobotError;
+use super::profile::Profile;
 
 /// The file within the configuration folder.
 pub const SCENE_FILE: &str = "scenes/robot.toml";
@@ -52,24 +53,26 @@ pub struct LegDrive {
     pub no_load_speed_rad_s: [f64; 3],
     /// Share of the no-load speed up to which the full torque is available.
     pub full_torque_speed_share: f64,
-    /// Viscous friction, N m s/rad.
-    pub damping: f64,
 }
 
 /// The arms' servos: joints 1 to 3.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArmServo {
     /// Stall torque, N m.
     pub torque_limit_nm: f64,
     /// No-load speed, rad/s.
     pub no_load_speed_rad_s: f64,
-    /// Own position gains, N m/rad.
-    pub kp: [f64; 3],
-    /// Own velocity gains, N m s/rad.
-    pub kd: [f64; 3],
-    /// Viscous friction, N m s/rad.
-    pub damping: f64,
+    /// Current at stall, A.
+    pub stall_current_a: f64,
+    /// Goal current, which limits the motor's, A.
+    pub current_limit_a: f64,
+    /// Register PWM Limit.
+    pub pwm_limit: f64,
+    /// Registers Position P Gain.
+    pub p_gain: [f64; 3],
+    /// Registers Position D Gain.
+    pub d_gain: [f64; 3],
 }
 
 /// The jaws and their servo.
@@ -112,30 +115,6 @@ pub struct Posture {
     pub held: bool,
     /// Time to settle before time zero, s.
     pub settle_s: f64,
-}
-
-/// Imperfections. Standard deviations unless the name says otherwise.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "each key is documented in the scene file and named by quantity and unit")]
-pub struct Profile {
-    pub command_latency_s: f64,
-    pub leg_friction_nm: f64,
-    pub arm_friction_nm: f64,
-    pub trunk_mass_factor: f64,
-    pub leg_position_noise_rad: f64,
-    pub arm_position_noise_rad: f64,
-    pub velocity_noise_rad_s: f64,
-    pub torque_noise_nm: f64,
-    pub gyro_noise_rad_s: f64,
-    pub gyro_bias_rad_s: f64,
-    pub accelerometer_noise_m_s2: f64,
-    pub accelerometer_bias_m_s2: f64,
-    pub tilt_bias_rad: f64,
-    pub attitude_noise_rad: f64,
-    pub yaw_drift_rad_s: f64,
-    pub foot_force_noise_n: f64,
-    pub foot_force_scale_error: f64,
 }
 
 impl Scene {
@@ -182,12 +161,8 @@ impl Scene {
             ));
         }
         for (name, profile) in &self.profile {
-            if !(0.0..=super::MAX_LATENCY_S).contains(&profile.command_latency_s) {
-                return Err(format!(
-                    "profile.{name}.command_latency_s = {} is not within 0 to {}",
-                    profile.command_latency_s,
-                    super::MAX_LATENCY_S
-                ));
+            if let Some(problem) = profile.problem(physics.timestep_s) {
+                return Err(format!("profile.{name}.{problem}"));
             }
         }
         Ok(())

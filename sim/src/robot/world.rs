@@ -9,7 +9,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, 
 
 use super::SimRobotError;
 use super::disturbance::Target;
-use super::mjcf::{FOOT_NAMES, GRASP_NAMES, GRIPPER_NAMES, GROUND, JAW_NAMES, TRUNK};
+use super::mjcf::{FOOT_NAMES, GRASP_NAMES, GRIPPER_NAMES, GROUND, JAW_NAMES, ROTOR, TRUNK};
+use super::profile::FootCompliance;
 use super::scene::Posture;
 
 /// Motors: the joints, then the jaws right and left.
@@ -28,6 +29,9 @@ pub struct World {
     calm: Arc<MjModel>,
     position_at: [usize; MOTORS],
     velocity_at: [usize; MOTORS],
+    /// Where the motors are: the joints themselves, or rotors before the play of their gears.
+    rotor_position_at: [usize; MOTORS],
+    rotor_velocity_at: [usize; MOTORS],
     partner_position_at: [usize; 2],
     foot_sites: [usize; 4],
     foot_geoms: [usize; 4],
@@ -64,9 +68,9 @@ pub struct Truth {
 }
 
 impl World {
-    /// Compiles the scene.
-    pub fn new(mjcf: &str) -> Result<Self, SimRobotError> {
-        let model = MjModel::from_xml_string(mjcf).map_err(mujoco)?;
+    /// Compiles the scene and puts rubber under the feet.
+    pub fn new(mjcf: &str, feet: &FootCompliance) -> Result<Self, SimRobotError> {
+        let mut model = MjModel::from_xml_string(mjcf).map_err(mujoco)?;
         let joint = |name: &str| id(&model, MjtObjBase::mjOBJ_JOINT, name);
         let site = |name: &str| id(&model, MjtObjBase::mjOBJ_SITE, name);
 
@@ -76,6 +80,13 @@ impl World {
             let joint = joint(name)?;
             position_at[place] = address(model.jnt_qposadr()[joint]);
             velocity_at[place] = address(model.jnt_dofadr()[joint]);
+        }
+        let (mut rotor_position_at, mut rotor_velocity_at) = (position_at, velocity_at);
+        for (place, name) in JOINT_NAMES.iter().enumerate() {
+            if let Some(rotor) = model.name_to_id(MjtObjBase::mjOBJ_JOINT, &format!("{name}{ROTOR}")) {
+                rotor_position_at[place] = address(model.jnt_qposadr()[rotor]);
+                rotor_velocity_at[place] = address(model.jnt_dofadr()[rotor]);
+            }
         }
         let mut partner_position_at = [0; 2];
         for (place, name) in JAW_NAMES.iter().enumerate() {
@@ -98,6 +109,9 @@ impl World {
         let grasps = [body(GRASP_NAMES[0])?, body(GRASP_NAMES[1])?];
         let is_trunk_geom = model.geom_bodyid().iter().map(|&body| address(body) == trunk).collect();
         let ground = i32::try_from(id(&model, MjtObjBase::mjOBJ_GEOM, GROUND)?).unwrap_or_default();
+        if feet.stiffness_n_m > 0.0 {
+            soften(&mut model, &foot_geoms, feet);
+        }
         let calm = Arc::new(model);
         let data = MjData::try_new(Arc::clone(&calm)).map_err(mujoco)?;
         Ok(Self {
@@ -105,6 +119,8 @@ impl World {
             calm,
             position_at,
             velocity_at,
+            rotor_position_at,
+            rotor_velocity_at,
             partner_position_at,
             foot_sites,
             foot_geoms,
@@ -137,8 +153,9 @@ impl World {
         let qpos = self.data.qpos_mut();
         qpos[TRUNK_POSITION..TRUNK_POSITION + 3].copy_from_slice(&[0.0, 0.0, posture.trunk_height_m]);
         qpos[TRUNK_QUATERNION..TRUNK_QUATERNION + 4].copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
-        for (&at, angle) in self.position_at.iter().zip(angles) {
-            qpos[at] = angle;
+        for motor in 0..MOTORS {
+            qpos[self.position_at[motor]] = angles[motor];
+            qpos[self.rotor_position_at[motor]] = angles[motor];
         }
         for at in self.partner_position_at {
             qpos[at] = jaw_rad;
@@ -152,14 +169,19 @@ impl World {
         self.data.step();
     }
 
-    /// Angle of a motor, rad.
+    /// Angle of the joint that a motor drives, rad.
     pub fn angle(&self, motor: usize) -> f64 {
         self.data.qpos()[self.position_at[motor]]
     }
 
-    /// Speed of a motor, rad/s.
+    /// Speed of the joint that a motor drives, rad/s.
     pub fn speed(&self, motor: usize) -> f64 {
         self.data.qvel()[self.velocity_at[motor]]
+    }
+
+    /// Speed of a motor itself, before the play of its gears, rad/s.
+    pub fn motor_speed(&self, motor: usize) -> f64 {
+        self.data.qvel()[self.rotor_velocity_at[motor]]
     }
 
     /// Angles of the 18 joints.
@@ -286,6 +308,23 @@ impl World {
             opening: [0.0; 2],
             fallen: self.fallen(),
         }
+    }
+}
+
+/// Makes the feet's contacts springs and dampers.
+///
+/// A contact at rest obeys `k r = R f` with the regularisation `R = A (1 - d) / d`: `d` is the impedance
+/// (`solimp`), `A` the inverse mass that MuJoCo assumes for the contact (`body_invweight0`). `solref` given as
+/// `(-s, -c)` means `k = s d / d²` and, with speed `v`, `b = c / d`. So a foot sinks by `f / K` when
+/// `s = K A (1 - d)`, and likewise `c = C A (1 - d)`.
+fn soften(model: &mut MjModel, feet: &[usize; 4], rubber: &FootCompliance) {
+    /// Impedance. The contact has an inertia of `d / (1 - d) / A` of its own: small with a small one.
+    const IMPEDANCE: f64 = 0.2;
+    for &foot in feet {
+        let body = address(model.geom_bodyid()[foot]);
+        let unit = model.body_invweight0()[body][0] * (1.0 - IMPEDANCE);
+        model.geom_solref_mut()[foot] = [-unit * rubber.stiffness_n_m, -unit * rubber.damping_n_s_m];
+        model.geom_solimp_mut()[foot] = [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0];
     }
 }
 
