@@ -102,7 +102,7 @@ fn session(offset: Vector3<f64>) -> Session {
 #[test]
 fn the_delay_of_a_robot_that_follows_late_is_found_and_taken_out() {
     let following = judge(&session(Vector3::zeros()));
-    let [torso, gripper] = &following.commanded;
+    let [torso, gripper, _] = &following.commanded;
     assert!((following.delay_s - 0.080).abs() < 0.003, "{}", following.delay_s);
     assert!((following.engaged_s - 4.0).abs() < 0.02);
     assert!(gripper.position.len() > 100 && torso.position.len() == gripper.position.len());

@@ -1,4 +1,4 @@
-//! The whole robot side in lockstep with physics: stands up, goes to a gripper, follows, comes back.
+//! The whole robot side in lockstep with physics: stands up, goes to a gripper or foot, follows, comes back.
 //!
 //! Errors are against the simulator's truth, with the sensors' imperfections on (profile `hw`).
 
@@ -8,7 +8,7 @@ mod session;
 
 use locoman_robot::{
     joints::Side,
-    modes::{Mode, Phase},
+    modes::{Effector, Mode, Phase},
     supervisor::Stop,
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -63,8 +63,8 @@ fn print(name: &str, e: &Errors) {
     );
 }
 
-/// Engages and moves; returns errors of torso and, in a gripper mode, of the gripper.
-fn follow(sut: &mut Session, side: Option<Side>, seconds: f64) -> (Errors, Option<Errors>) {
+/// Engages and moves; returns errors of torso and, on three feet, of the end effector.
+fn follow(sut: &mut Session, effector: Option<Effector>, seconds: f64) -> (Errors, Option<Errors>) {
     sut.operator().engagement += 1;
     sut.run(1.0);
     let axes = {
@@ -72,8 +72,10 @@ fn follow(sut: &mut Session, side: Option<Side>, seconds: f64) -> (Errors, Optio
         let estimated = sut.snapshot().torso.pose.rotation;
         sut.truth.world_from_torso.rotation * estimated.inverse()
     };
+    let side = effector.map(Effector::side);
     let (mut wanted, mut torso, mut wanted_hand, mut hand) = (vec![], vec![], vec![], vec![]);
     let start_ns = sut.time_ns;
+    let point = matches!(effector, Some(Effector::Foot(_)));
     for _ in 0..(seconds * 400.0) as usize {
         let t = (sut.time_ns - start_ns) as f64 * 1e-9;
         let (torso_length, torso_angle) = if side.is_some() {
@@ -92,9 +94,13 @@ fn follow(sut: &mut Session, side: Option<Side>, seconds: f64) -> (Errors, Optio
         }
         sut.tick(Stop::None);
         wanted.push(of_torso);
-        wanted_hand.push(of_hand);
+        wanted_hand.push(if point { Isometry3::from(of_hand.translation) } else { of_hand });
         torso.push(sut.truth.world_from_torso);
-        hand.push(side.map_or(Isometry3::identity(), |side| sut.truth.world_from_gripper[side.index()]));
+        hand.push(match effector {
+            None => Isometry3::identity(),
+            Some(Effector::Gripper(side)) => sut.truth.world_from_gripper[side.index()],
+            Some(Effector::Foot(side)) => Isometry3::from(sut.truth.feet_in_world[side.leg().index()].coords),
+        });
     }
     let hand_errors = side.map(|_| errors(&wanted_hand, &hand, &axes));
     sut.operator().engagement = 0;
@@ -115,15 +121,15 @@ fn a_lying_robot_stands_up_and_its_torso_follows() {
     assert!(sut.worst_tilt < 0.5);
 }
 
-fn gripper_there_and_back(side: Side, profile: &str) {
+fn there_and_back(effector: Effector, profile: &str) {
     let mut sut = Session::new("lying", profile, 1);
     sut.run_until("stance", 10.0, |s| s.phase == Phase::Stance);
     sut.join();
-    sut.request(Mode::Gripper(side));
-    let (torso, hand) = follow(&mut sut, Some(side), 12.0);
+    sut.request(effector.mode());
+    let (torso, hand) = follow(&mut sut, Some(effector), 12.0);
     let hand = hand.unwrap();
-    print(&format!("{side:?} {profile} torso"), &torso);
-    print(&format!("{side:?} {profile} gripper"), &hand);
+    print(&format!("{effector:?} {profile}, torso"), &torso);
+    print(&format!("{effector:?} {profile}, end effector"), &hand);
     sut.request(Mode::Stance);
     sut.run(1.0);
     let forces = sut.truth.foot_force_n;
@@ -135,10 +141,20 @@ fn gripper_there_and_back(side: Side, profile: &str) {
 
 #[test]
 fn the_right_gripper_follows_the_palm_and_the_foot_comes_back() {
-    gripper_there_and_back(Side::Right, "hw");
+    there_and_back(Effector::Gripper(Side::Right), "hw");
 }
 
 #[test]
 fn the_left_gripper_follows_the_palm_and_the_foot_comes_back() {
-    gripper_there_and_back(Side::Left, "hw");
+    there_and_back(Effector::Gripper(Side::Left), "hw");
+}
+
+#[test]
+fn the_right_foot_follows_the_palm_and_comes_back() {
+    there_and_back(Effector::Foot(Side::Right), "hw");
+}
+
+#[test]
+fn the_left_foot_follows_the_palm_and_comes_back() {
+    there_and_back(Effector::Foot(Side::Left), "hw");
 }

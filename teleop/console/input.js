@@ -9,14 +9,14 @@ const KEYS = {
   KeyI: ['angular', 1, 1], KeyK: ['angular', 1, -1], KeyU: ['angular', 2, 1], KeyO: ['angular', 2, -1],
   KeyV: ['opening', 0, 1], KeyC: ['opening', 0, -1],
 };
-const MODE_KEYS = { Digit1: 'stance', Digit2: 'right_gripper', Digit3: 'left_gripper', Digit4: 'lie_down' };
+const MODE_KEYS = { Digit1: 'stance', Digit2: 'right_gripper', Digit3: 'left_gripper', Digit4: 'lie_down', Digit5: 'right_foot', Digit6: 'left_foot' };
 // Standard mapping of the Gamepad API.
-const PAD = { a: 0, b: 1, x: 2, rb: 5, lt: 6, rt: 7, back: 8, start: 9, l3: 10, r3: 11, up: 12, down: 13, left: 14, right: 15, lb: 4 };
-const PAD_MODES = [[PAD.a, 'stance'], [PAD.b, 'right_gripper'], [PAD.x, 'left_gripper'], [PAD.start, 'lie_down']];
+const PAD = { a: 0, b: 1, x: 2, rb: 5, lt: 6, rt: 7, back: 8, start: 9, l3: 10, r3: 11, up: 12, down: 13, left: 14, right: 15, lb: 4, guide: 16 };
+const PAD_MODES = [[PAD.a, 'stance'], [PAD.b, 'right_gripper'], [PAD.x, 'left_gripper'], [PAD.right, 'right_foot'], [PAD.left, 'left_foot'], [PAD.start, 'lie_down']];
 
 export function makeInput({ engageButton, send, requestMode, stop, changed }) {
   const down = new Set();
-  const state = { drive: 'sticks', target: 'gripper' };
+  const state = { drive: 'sticks', target: 'effector' };
   let [mouse, sentHeld, padBefore] = [false, false, []];
 
   const pad = () => [...(navigator.getGamepads?.() ?? [])].find((p) => p && p.connected);
@@ -35,13 +35,14 @@ export function makeInput({ engageButton, send, requestMode, stop, changed }) {
       const value = (i) => p.buttons[i]?.value ?? 0;
       input.linear[0] -= p.axes[1]; input.linear[1] -= p.axes[0];
       input.linear[2] += value(PAD.rt) - value(PAD.lt);
-      input.angular[0] += value(PAD.right) - value(PAD.left);
-      input.angular[1] -= p.axes[3]; input.angular[2] -= p.axes[2];
+      input.angular[1] -= p.axes[3];
+      if (pressed(p, PAD.lb)) input.angular[0] += p.axes[2];
+      else input.angular[2] -= p.axes[2];
       input.opening += value(PAD.l3) - value(PAD.r3);
       const edge = (i) => pressed(p, i) && !padBefore[i];
       for (const [button, mode] of PAD_MODES) if (edge(button)) requestMode(mode);
       if (edge(PAD.back)) stop();
-      if (edge(PAD.lb)) set('target', state.target === 'torso' ? 'gripper' : 'torso');
+      if (edge(PAD.guide)) set('target', state.target === 'torso' ? 'effector' : 'torso');
       padBefore = p.buttons.map((b) => b.pressed);
     }
     const clamp = (v) => Math.max(-1, Math.min(1, v));
@@ -64,7 +65,7 @@ export function makeInput({ engageButton, send, requestMode, stop, changed }) {
     if (event.code === 'Space') event.preventDefault(); // would press the focused button
     if (event.repeat) return;
     if (event.code === 'Escape') stop();
-    else if (event.code === 'KeyT') set('target', state.target === 'torso' ? 'gripper' : 'torso');
+    else if (event.code === 'KeyT') set('target', state.target === 'torso' ? 'effector' : 'torso');
     else if (MODE_KEYS[event.code]) requestMode(MODE_KEYS[event.code]);
     else { down.add(event.code); tick(); }
   });

@@ -32,9 +32,13 @@ function ghostBox(x, y, z) {
   return group;
 }
 
+function targetPoint(radius) {
+  return new Mesh(new SphereGeometry(radius, 16, 12), new MeshStandardMaterial({ color: TARGET, emissive: 0x553300 }));
+}
+
 function targetFrame() {
   const group = new Group();
-  group.add(new AxesHelper(0.09), new Mesh(new SphereGeometry(0.013, 16, 12), new MeshStandardMaterial({ color: TARGET, emissive: 0x553300 })));
+  group.add(new AxesHelper(0.09), targetPoint(0.013));
   return group;
 }
 
@@ -98,8 +102,9 @@ export async function makeScene(canvas) {
   world.add(torso);
   const torsoTarget = ghostBox(0.3762, 0.0935, 0.114);
   const gripperTargets = [targetFrame(), targetFrame()];
-  world.add(torsoTarget, ...gripperTargets);
-  [torsoTarget, ...gripperTargets].forEach((object) => { object.visible = false; });
+  const footTargets = [targetPoint(FOOT_RADIUS_M + 0.004), targetPoint(FOOT_RADIUS_M + 0.004)];
+  world.add(torsoTarget, ...gripperTargets, ...footTargets);
+  [torsoTarget, ...gripperTargets, ...footTargets].forEach((object) => { object.visible = false; });
   const showShells = operatorShells(scene);
 
   let robot = null;
@@ -144,6 +149,7 @@ export async function makeScene(canvas) {
       setPose(torsoTarget, state.torso_target);
       setPose(gripperTargets[0], state.gripper_targets[0]);
       setPose(gripperTargets[1], state.gripper_targets[1]);
+      ['right_foot', 'left_foot'].forEach((mode, i) => setPose(footTargets[i], state.mode === mode ? state.foot_targets[i] : null));
       dirty = true;
     },
     operator(shells) { showShells(shells); dirty = true; },

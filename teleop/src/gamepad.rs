@@ -1,8 +1,9 @@
 //! A gamepad at this computer, read by gilrs on a thread of its own.
 //!
-//! Right shoulder: dead-man. Left stick: x and y; triggers: down and up; right stick: pitch and yaw; D-pad
-//! left and right: roll; sticks pressed: open, close. Left shoulder: torso or gripper. South (A): stance,
-//! East (B): right gripper, West (X): left gripper, Start: lie down, Select (Back): stop, twice: damp.
+//! Right shoulder: dead-man. Left stick: x and y; triggers: down and up; right stick: pitch and yaw, with the
+//! left shoulder held pitch and roll; sticks pressed: open, close. Centre (Guide): torso, or foot or gripper.
+//! South (A): stance, East (B): right gripper, West (X): left gripper, D-pad right and left: right and left
+//! foot, Start: lie down, Select (Back): stop, twice: damp.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,7 +37,7 @@ pub fn names() -> Result<Vec<String>, String> {
 }
 
 fn run(mut gilrs: Gilrs, board: &Board, stop: &StopButton) {
-    let mut target = Target::Gripper;
+    let mut target = Target::Effector;
     while !board.stopping() {
         while let Some(event) = gilrs.next_event() {
             if let EventType::ButtonPressed(button, _) = event.event {
@@ -55,13 +56,15 @@ fn pressed(button: Button, target: &mut Target, board: &Board, stop: &StopButton
         Button::South => Mode::Stance,
         Button::East => Mode::RightGripper,
         Button::West => Mode::LeftGripper,
+        Button::DPadRight => Mode::RightFoot,
+        Button::DPadLeft => Mode::LeftFoot,
         Button::Start => Mode::LieDown,
         Button::Select => {
             stop.press();
             return;
         }
-        Button::LeftTrigger => {
-            *target = if *target == Target::Torso { Target::Gripper } else { Target::Torso };
+        Button::Mode => {
+            *target = if *target == Target::Torso { Target::Effector } else { Target::Torso };
             return;
         }
         _ => return,
@@ -72,6 +75,7 @@ fn pressed(button: Button, target: &mut Target, board: &Board, stop: &StopButton
 fn hand(pad: &Gamepad<'_>, target: Target) -> Hand {
     let axis = |axis| f64::from(pad.value(axis));
     let button = |button| if pad.is_pressed(button) { 1.0 } else { 0.0 };
+    let (sideways, rolls) = (axis(Axis::RightStickX), pad.is_pressed(Button::LeftTrigger));
     let trigger = |button| pad.button_data(button).map_or(0.0, |data| f64::from(data.value()));
     Hand {
         held: pad.is_pressed(Button::RightTrigger),
@@ -83,11 +87,11 @@ fn hand(pad: &Gamepad<'_>, target: Target) -> Hand {
             -axis(Axis::LeftStickX),
             trigger(Button::RightTrigger2) - trigger(Button::LeftTrigger2),
         ],
-        angular: [
-            button(Button::DPadRight) - button(Button::DPadLeft),
-            axis(Axis::RightStickY),
-            -axis(Axis::RightStickX),
-        ],
+        angular: if rolls {
+            [sideways, axis(Axis::RightStickY), 0.0]
+        } else {
+            [0.0, axis(Axis::RightStickY), -sideways]
+        },
         opening: button(Button::LeftThumb) - button(Button::RightThumb),
     }
 }

@@ -117,6 +117,8 @@ struct RunArgs {
 enum AutoMode {
     RightGripper,
     LeftGripper,
+    RightFoot,
+    LeftFoot,
     Stance,
 }
 
@@ -125,6 +127,8 @@ impl From<AutoMode> for Mode {
         match mode {
             AutoMode::RightGripper => Self::RightGripper,
             AutoMode::LeftGripper => Self::LeftGripper,
+            AutoMode::RightFoot => Self::RightFoot,
+            AutoMode::LeftFoot => Self::LeftFoot,
             AutoMode::Stance => Self::Stance,
         }
     }

@@ -269,7 +269,7 @@ impl Pilot {
             Source::Sticks(sticks) => {
                 let hand =
                     if engagement.device == Device::Joystick { &inputs.joystick } else { &inputs.browser };
-                engagement.motion = sticks.advance(hand, robot.and_then(RobotView::gripper), dt_s);
+                engagement.motion = sticks.advance(hand, robot.and_then(RobotView::side), dt_s);
                 engagement.capture_ns = now_ns;
             }
             Source::Tracker(mapper) => {

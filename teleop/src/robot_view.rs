@@ -37,14 +37,13 @@ impl RobotView {
         self.mode == mode && self.goal == mode
     }
 
-    /// The side (0 right, 1 left) that the robot manipulates with.
-    pub fn gripper(&self) -> Option<usize> {
-        if self.in_mode(Mode::RightGripper) {
-            Some(0)
-        } else if self.in_mode(Mode::LeftGripper) {
-            Some(1)
-        } else {
-            None
+    /// The side (0 right, 1 left) that the robot manipulates with, by foot or gripper.
+    pub fn side(&self) -> Option<usize> {
+        match self.mode {
+            _ if self.goal != self.mode => None,
+            Mode::RightGripper | Mode::RightFoot => Some(0),
+            Mode::LeftGripper | Mode::LeftFoot => Some(1),
+            _ => None,
         }
     }
 }

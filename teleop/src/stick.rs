@@ -26,8 +26,8 @@ pub enum Target {
     /// The robot's torso.
     #[default]
     Torso,
-    /// The gripper of the mode that the robot is in; without one, the torso.
-    Gripper,
+    /// The foot or gripper of the mode that the robot is in; without one, the torso.
+    Effector,
 }
 
 /// The state of a device in a person's hands.
@@ -53,7 +53,7 @@ pub struct Hand {
 pub struct StickMotion {
     config: Stick,
     torso: Isometry3<f64>,
-    grippers: [Isometry3<f64>; 2],
+    effectors: [Isometry3<f64>; 2],
     openings: [f64; 2],
 }
 
@@ -63,21 +63,22 @@ impl StickMotion {
         Self {
             config: *config,
             torso: Isometry3::identity(),
-            grippers: [Isometry3::identity(); 2],
+            effectors: [Isometry3::identity(); 2],
             openings: openings.map(|opening| if opening.is_finite() { opening.clamp(0.0, 1.0) } else { 0.0 }),
         }
     }
 
-    /// Moves on by `dt_s`. `gripper` is the side (0 right, 1 left) that the robot manipulates with now.
-    pub fn advance(&mut self, hand: &Hand, gripper: Option<usize>, dt_s: f64) -> Motion {
+    /// Moves on by `dt_s`. `side` (0 right, 1 left) is the one that the robot manipulates with now, by foot or
+    /// gripper; of a foot's motion the robot takes the translation.
+    pub fn advance(&mut self, hand: &Hand, side: Option<usize>, dt_s: f64) -> Motion {
         let linear = Vector3::from(hand.linear.map(|v| self.deflection(v)));
         let angular = Vector3::from(hand.angular.map(|v| self.deflection(v)));
         let c = &self.config;
-        match gripper.filter(|_| hand.target == Target::Gripper) {
+        match side.filter(|_| hand.target == Target::Effector) {
             Some(side) => {
                 let pose =
-                    moved(&self.grippers[side], linear * c.gripper_m_s, angular * c.gripper_rad_s, dt_s);
-                self.grippers[side] = within(&pose, c.gripper_limit_m, c.gripper_limit_rad);
+                    moved(&self.effectors[side], linear * c.gripper_m_s, angular * c.gripper_rad_s, dt_s);
+                self.effectors[side] = within(&pose, c.gripper_limit_m, c.gripper_limit_rad);
             }
             None => {
                 let speed = Vector3::new(c.torso_xy_m_s, c.torso_xy_m_s, c.torso_z_m_s);
@@ -86,12 +87,12 @@ impl StickMotion {
             }
         }
         let mut motion = Motion { bodies: [Some(self.torso), None, None], openings: [None; 2] };
-        if let Some(side) = gripper {
+        if let Some(side) = side {
             let step = self.deflection(hand.opening) * self.config.opening_per_s * dt_s;
             self.openings[side] = (self.openings[side] + step).clamp(0.0, 1.0);
             motion.openings[side] = Some(self.openings[side]);
             let body = [Body::RightPalm, Body::LeftPalm][side];
-            motion.bodies[body as usize] = Some(self.grippers[side]);
+            motion.bodies[body as usize] = Some(self.effectors[side]);
         }
         motion
     }
@@ -147,7 +148,7 @@ mod tests {
         let mut sut = StickMotion::engage(&config, [0.5; 2]);
         let mut motion = Motion::default();
         for _ in 0..100 {
-            motion = sut.advance(&forward(Target::Gripper), Some(0), 0.01);
+            motion = sut.advance(&forward(Target::Effector), Some(0), 0.01);
         }
         assert!((motion.body(Body::RightPalm).unwrap().translation.x - config.gripper_m_s).abs() < 1e-9);
         assert_eq!(motion.body(Body::Torso), Some(&Isometry3::identity()));
@@ -156,9 +157,9 @@ mod tests {
     }
 
     #[test]
-    fn without_a_gripper_mode_the_sticks_move_the_torso() {
+    fn on_four_feet_the_sticks_move_the_torso() {
         let mut sut = StickMotion::engage(&Stick::default(), [0.0; 2]);
-        let motion = sut.advance(&forward(Target::Gripper), None, 0.1);
+        let motion = sut.advance(&forward(Target::Effector), None, 0.1);
         assert!(motion.body(Body::Torso).unwrap().translation.x > 0.0);
         assert_eq!(motion.body(Body::RightPalm), None);
     }
@@ -167,13 +168,13 @@ mod tests {
         #[test]
         fn whatever_a_device_reports_the_displacement_is_finite_and_within_its_limits(
             linear in prop::array::uniform3(any::<f64>()), angular in prop::array::uniform3(any::<f64>()),
-            opening in any::<f64>(), steps in 1..400usize, gripper in prop::option::of(0..2usize),
+            opening in any::<f64>(), steps in 1..400usize, side in prop::option::of(0..2usize),
         ) {
             let config = Stick::default();
-            let hand = Hand { held: true, target: Target::Gripper, linear, angular, opening, ..Hand::default() };
+            let hand = Hand { held: true, target: Target::Effector, linear, angular, opening, ..Hand::default() };
             let mut sut = StickMotion::engage(&config, [f64::NAN, 2.0]);
             for _ in 0..steps {
-                let motion = sut.advance(&hand, gripper, 0.1);
+                let motion = sut.advance(&hand, side, 0.1);
                 let torso = motion.body(Body::Torso).unwrap().translation.vector;
                 prop_assert!(torso.xy().amax() <= config.torso_xy_limit_m && torso.z.abs() <= config.torso_z_limit_m);
                 for pose in motion.bodies.iter().flatten() {

@@ -25,7 +25,8 @@ pub struct Args {
     /// Write what was measured as JSON.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// The mode in which the recorded operator drives: right-gripper, left-gripper, stance.
+    /// The mode in which the recorded operator drives: right-gripper, left-gripper, right-foot,
+    /// left-foot, stance.
     #[arg(long, value_name = "MODE", default_value = "right-gripper")]
     mode: String,
     /// Address of the browser console.
@@ -56,8 +57,8 @@ const WHAT_TO_PRESS: &str = "
     W S  A D  R F    move forward and back, left and right, up and down
     J L  I K  U O    turn: roll, pitch, yaw
     C V              close and open the gripper
-    T                move the torso in place of the gripper, and back
-    1 2 3 4          stance, right gripper, left gripper, lie down
+    T                move the torso in place of the gripper or foot, and back
+    1 2 3 4 5 6      stance, right gripper, left gripper, lie down, right foot, left foot
     Esc              stop: settle and lie down; twice: damp at once
   A gamepad works too: hold the right shoulder button.
   Ctrl-C here ends everything.

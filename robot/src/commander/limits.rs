@@ -3,6 +3,8 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
+use crate::joints::Side;
+
 /// A symmetric or lopsided range.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -71,28 +73,29 @@ impl TorsoRange {
     }
 }
 
-/// Range of a gripper's target about where it was when its mode began; orientation is free.
+/// Range of a foot's or gripper's target about where it was when its mode began; orientation is free.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GripperRange {
+pub struct LimbRange {
     /// m.
     pub x: Range,
-    /// m, positive outwards: mirrored for the right gripper.
+    /// m, positive outwards: mirrored for the right side.
     pub outward: Range,
     /// m.
     pub z: Range,
 }
 
-impl GripperRange {
-    /// The nearest position inside the box about `start`; `outward` is +1 for the left side, -1 for the right.
-    pub fn clamp(&self, position: &Vector3<f64>, start: &Vector3<f64>, outward: f64) -> Vector3<f64> {
+impl LimbRange {
+    /// The nearest position inside the box about `start`.
+    pub fn clamp(&self, position: &Vector3<f64>, start: &Vector3<f64>, side: Side) -> Vector3<f64> {
+        let outward = if side == Side::Left { 1.0 } else { -1.0 };
         let d = position - start;
         let y = outward * self.outward.clamp(outward * d.y);
         start + Vector3::new(self.x.clamp(d.x), y, self.z.clamp(d.z))
     }
 }
 
-/// Joint angles within which leg and arm reach for a gripper's target.
+/// Joint angles within which leg and arm reach for a target.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReachRange {
@@ -112,17 +115,19 @@ pub struct ReachRange {
 pub struct Limits {
     /// Torso on four feet.
     pub stance_torso: TorsoRange,
-    /// Torso while a gripper is used.
+    /// Torso on three feet.
     pub gripper_torso: TorsoRange,
     /// Gripper.
-    pub gripper: GripperRange,
-    /// Joints behind a gripper.
+    pub gripper: LimbRange,
+    /// Foot in the air.
+    pub foot: LimbRange,
+    /// Joints behind a gripper or a foot in the air.
     pub reach: ReachRange,
     /// How fast the torso's target moves on four feet.
     pub stance_torso_rate: RateLimits,
-    /// How fast the torso's target moves while a gripper is used.
+    /// How fast the torso's target moves on three feet.
     pub gripper_torso_rate: RateLimits,
-    /// How fast a gripper's target moves.
+    /// How fast the target of a gripper or of a foot in the air moves.
     pub gripper_rate: RateLimits,
     /// How fast the jaws' target moves, full strokes per second.
     pub opening_per_s: f64,
@@ -149,10 +154,15 @@ impl Default for Limits {
         Self {
             stance_torso: TorsoRange { z: Range { min: -0.12, max: 0.07 }, ..gripper_torso },
             gripper_torso,
-            gripper: GripperRange {
+            gripper: LimbRange {
                 x: Range { min: -0.2, max: 0.22 },
                 outward: Range { min: -0.15, max: 0.22 },
                 z: Range { min: -0.15, max: 0.3 },
+            },
+            foot: LimbRange {
+                x: Range { min: -0.15, max: 0.15 },
+                outward: Range { min: -0.1, max: 0.15 },
+                z: Range { min: -0.08, max: 0.2 },
             },
             reach: ReachRange {
                 hip: Range::around_zero(0.83),

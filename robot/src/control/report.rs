@@ -1,5 +1,7 @@
 //! The snapshot of a control step.
 
+use nalgebra::Isometry3;
+
 use super::{
     controller::Controller,
     snapshot::{BodyState, Snapshot},
@@ -30,6 +32,19 @@ impl Controller {
             };
             BodyState { pose, target }
         };
+        let foot = |side: Side| {
+            let point = |torso: &Isometry3<f64>, joints| {
+                let foot = torso * torso_from_frame(&self.config.model, joints, Frame::Foot(side.leg()));
+                Isometry3::from(foot.translation)
+            };
+            let pose = point(&torso, &sensors.position);
+            let target = match setpoint.foot(side.leg()) {
+                Some(reference) if balanced => Isometry3::from(reference.position),
+                _ if balanced => point(&torso_target, &self.desired),
+                _ => pose,
+            };
+            BodyState { pose, target }
+        };
         let holding = assessment.severity >= Severity::Hold;
         self.snapshot = Snapshot {
             time_ns: sensors.time_ns,
@@ -48,6 +63,7 @@ impl Controller {
             world_resets: self.estimator.resets(),
             torso: BodyState { pose: torso, target: torso_target },
             grippers: Side::ALL.map(gripper),
+            feet: Side::ALL.map(foot),
             command: self.trace,
             period: self.snapshot.period,
             compute: self.snapshot.compute,

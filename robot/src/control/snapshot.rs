@@ -68,6 +68,8 @@ pub struct Snapshot {
     pub torso: BodyState,
     /// Grippers right, left.
     pub grippers: [BodyState; 2],
+    /// Centres of the front feet right, left, without orientation.
+    pub feet: [BodyState; 2],
     /// The command acted on.
     pub command: CommandTrace,
     /// Time from one sample to the next, over the last second.
@@ -99,6 +101,7 @@ impl Snapshot {
             world_resets: 0,
             torso: nowhere,
             grippers: [nowhere; 2],
+            feet: [nowhere; 2],
             command: CommandTrace::default(),
             period: Percentiles::default(),
             compute: Percentiles::default(),

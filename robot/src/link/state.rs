@@ -11,6 +11,7 @@ use crate::{
 /// Fills in the message; its header is the sender's.
 pub fn message(snapshot: &Snapshot, commands_accepted: u64, commands_rejected: u64) -> RobotState {
     let [right, left] = &snapshot.grippers;
+    let [right_foot, left_foot] = &snapshot.feet;
     let pose = |pose| Some(Pose::from(pose));
     RobotState {
         header: None,
@@ -35,6 +36,10 @@ pub fn message(snapshot: &Snapshot, commands_accepted: u64, commands_rejected: u
         right_gripper_target: pose(&right.target),
         left_gripper: pose(&left.pose),
         left_gripper_target: pose(&left.target),
+        right_foot: pose(&right_foot.pose),
+        right_foot_target: pose(&right_foot.target),
+        left_foot: pose(&left_foot.pose),
+        left_foot_target: pose(&left_foot.target),
         command_source: snapshot.command.source,
         command_sequence: snapshot.command.sequence,
         command_capture_ns: snapshot.command.capture_ns,

@@ -8,10 +8,10 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::{
     driving::{Driving, Operator},
     leg_return::LegReturn,
-    mode::Phase,
+    mode::{Effector, Phase},
     posture_motion::PostureMotion,
     scene::Scene,
-    setpoint::{ArmGoal, Setpoint},
+    setpoint::Setpoint,
     settings::{MotionSettings, PoseSettings},
 };
 use crate::{
@@ -127,10 +127,8 @@ impl Choreography {
         let arms = Side::ALL.map(|side| scene.desired_arm(side));
         self.setpoint = Setpoint::standing(&scene.state.world_from_torso, arms);
         if let Some(side) = lifted {
-            let posture = PointReference::hold(scene.desired_arm(side));
-            let foot = PointReference::hold(scene.foot(side.leg()));
-            self.setpoint.arms[side.index()] = ArmGoal::PostureAndFoot(posture, foot);
-            self.setpoint.contacts = self.setpoint.contacts.with_share(side.leg(), 0.0);
+            self.setpoint.lift(side, PointReference::hold(scene.foot(side.leg())));
+            self.setpoint.contacts = self.setpoint.row().contacts();
         }
     }
 
@@ -155,25 +153,31 @@ impl Choreography {
                 self.stow_arms(scene);
             }
             Phase::Stance => self.driving.begin_stance(&self.setpoint),
-            Phase::ShiftTorso(side) => {
-                let shift = self.poses.shift(side);
+            Phase::ShiftTorso(effector) => {
+                let shift = self.poses.shift(effector.side());
                 self.move_torso(&Isometry3::from_parts(shift.into(), UnitQuaternion::identity()));
                 self.stow_arms(scene);
             }
-            Phase::LiftFoot(side) => self.begin_lift(side, scene),
+            Phase::LiftFoot(effector) => self.begin_lift(effector, scene),
+            Phase::SingleFoot(side) => self.driving.begin_foot(side, &mut self.setpoint, scene),
             Phase::SingleGripper(side) => self.driving.begin_gripper(side, &mut self.setpoint, scene),
             Phase::Stow(side) => self.begin_stow(side, scene, &stand),
             Phase::LowerFoot(side) => self.begin_lowering(side, scene),
         }
     }
 
-    fn begin_lift(&mut self, side: Side, scene: &Scene<'_>) {
+    fn begin_lift(&mut self, effector: Effector, scene: &Scene<'_>) {
+        let side = effector.side();
         self.move_torso(&Isometry3::identity());
         let foot = self.foot_reference(side, scene);
         let rise = (scene.landing(side).z + self.poses.lift_m - foot.position.z).max(0.0);
         let up = foot.position + rise * Vector3::z();
         self.foot = PointMotion::new(&foot, &up, self.motions.lift_s);
-        self.move_arm(side, &self.poses.ready(side), scene);
+        let arm = match effector {
+            Effector::Foot(side) => self.poses.stow(side),
+            Effector::Gripper(side) => self.poses.ready(side),
+        };
+        self.move_arm(side, &arm, scene);
     }
 
     fn begin_stow(&mut self, side: Side, scene: &Scene<'_>, stand: &JointVector) {
@@ -214,17 +218,17 @@ impl Choreography {
                 Progress::on_four_feet(self.torso.is_over(elapsed_s) && arms_over)
             }
             Phase::Stance => {
-                self.driving.step(None, operator, scene, &mut self.setpoint);
+                self.driving.step(operator, scene, &mut self.setpoint);
                 Progress::on_four_feet(true)
             }
-            Phase::ShiftTorso(side) => {
+            Phase::ShiftTorso(effector) => {
                 self.play(elapsed_s);
-                let may_lift = scene.may_lift(side, self.motions.lift_margin_m);
+                let may_lift = scene.may_lift(effector.side(), self.motions.lift_margin_m);
                 Progress::on_four_feet(self.torso.is_over(elapsed_s) && may_lift)
             }
-            Phase::LiftFoot(side) => self.lift(side, elapsed_s, load_step),
-            Phase::SingleGripper(side) => {
-                self.driving.step(Some(side), operator, scene, &mut self.setpoint);
+            Phase::LiftFoot(effector) => self.lift(effector, elapsed_s, load_step),
+            Phase::SingleFoot(_) | Phase::SingleGripper(_) => {
+                self.driving.step(operator, scene, &mut self.setpoint);
                 Progress::on_three_feet(true)
             }
             Phase::Stow(side) => {
@@ -237,9 +241,9 @@ impl Choreography {
     }
 
     /// Unloads the foot, then lifts it and unfolds the arm.
-    fn lift(&mut self, side: Side, elapsed_s: f64, load_step: f64) -> Progress {
+    fn lift(&mut self, effector: Effector, elapsed_s: f64, load_step: f64) -> Progress {
         let MotionSettings { load_s, lift_s, arm_s, .. } = self.motions;
-        let leg = side.leg();
+        let (side, leg) = (effector.side(), effector.side().leg());
         if self.setpoint.contacts.contains(leg) {
             self.setpoint.torso = self.torso.sample(elapsed_s);
             self.setpoint.load(leg, 0.0, load_step);
@@ -250,7 +254,11 @@ impl Choreography {
         let lifting_s = elapsed_s - load_s;
         let foot = self.foot.sample(lifting_s);
         self.play_lifted(side, elapsed_s, lifting_s - UNFOLD_AFTER * lift_s, foot);
-        Progress::on_three_feet(elapsed_s >= load_s + UNFOLD_AFTER * lift_s + arm_s)
+        let over_s = match effector {
+            Effector::Foot(_) => lift_s,
+            Effector::Gripper(_) => UNFOLD_AFTER * lift_s + arm_s,
+        };
+        Progress::on_three_feet(lifting_s >= over_s)
     }
 
     /// Lowers the foot until it feels the ground, then loads it.
@@ -263,7 +271,8 @@ impl Choreography {
             let no_ground = elapsed_s >= self.foot.duration_s();
             return Progress { no_ground, ..Progress::on_three_feet(false) };
         }
-        self.setpoint.arms[side.index()] = ArmGoal::Posture(PointReference::hold(self.poses.stow(side)));
+        self.setpoint.stand();
+        self.setpoint.hold_arm(side, PointReference::hold(self.poses.stow(side)));
         self.setpoint.load(leg, 1.0, load_step);
         Progress::on_four_feet(self.setpoint.contacts.share(leg) >= 1.0)
     }
@@ -271,14 +280,17 @@ impl Choreography {
     /// Torso and arms on their motions, four feet on the ground.
     fn play(&mut self, elapsed_s: f64) {
         self.setpoint.torso = self.torso.sample(elapsed_s);
-        self.setpoint.arms = self.arms.map(|motion| ArmGoal::Posture(motion.sample(elapsed_s)));
+        self.setpoint.stand();
+        for side in Side::ALL {
+            self.setpoint.hold_arm(side, self.arms[side.index()].sample(elapsed_s));
+        }
     }
 
     /// Torso and arm on their motions, one foot in the air.
     fn play_lifted(&mut self, side: Side, elapsed_s: f64, arm_elapsed_s: f64, foot: PointReference) {
         self.setpoint.torso = self.torso.sample(elapsed_s);
-        let posture = self.arms[side.index()].sample(arm_elapsed_s);
-        self.setpoint.arms[side.index()] = ArmGoal::PostureAndFoot(posture, foot);
+        self.setpoint.lift(side, foot);
+        self.setpoint.hold_arm(side, self.arms[side.index()].sample(arm_elapsed_s));
     }
 
     fn move_torso(&mut self, goal: &Isometry3<f64>) {
@@ -298,17 +310,15 @@ impl Choreography {
 
     /// Begins an arm's motion; one that followed its gripper's pose begins at the desired joints.
     fn move_arm(&mut self, side: Side, goal: &Vector3<f64>, scene: &Scene<'_>) {
-        let start = match self.setpoint.arms[side.index()] {
-            ArmGoal::Posture(posture) | ArmGoal::PostureAndFoot(posture, _) => posture,
-            ArmGoal::Gripper(_) => PointReference::hold(scene.desired_arm(side)),
-        };
+        let desired = PointReference::hold(scene.desired_arm(side));
+        let start = self.setpoint.arm(side).copied().unwrap_or(desired);
         self.arms[side.index()] = PointMotion::new(&start, goal, self.motions.arm_s);
     }
 
     /// Reference of a foot: its own if it has one, else where the desired joints take it.
     fn foot_reference(&self, side: Side, scene: &Scene<'_>) -> PointReference {
-        if let ArmGoal::PostureAndFoot(_, foot) = self.setpoint.arms[side.index()] {
-            return foot;
+        if let Some(foot) = self.setpoint.foot(side.leg()) {
+            return *foot;
         }
         let torso_from_foot = torso_from_frame(scene.model, scene.desired, Frame::Foot(side.leg()));
         PointReference::hold((self.setpoint.torso.pose() * torso_from_foot).translation.vector)

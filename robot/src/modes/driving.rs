@@ -1,20 +1,18 @@
-//! Torso, gripper and jaws as the operator moves them, inside every limit.
+//! Torso, foot or gripper, and jaws as the operator moves them, inside every limit.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::{
-    scene::Scene,
-    setpoint::{ArmGoal, Setpoint},
-};
+use super::{mode::Effector, scene::Scene, setpoint::Setpoint};
 use crate::{
     commander::{
-        Command, DrivenBody, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock, from_above,
-        push_inside,
+        Command, DrivenBody, FootReach, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
+        from_above, push_inside,
     },
     joints::{JointVector, Side},
     kinematics::torso_from_frame,
     model::Frame,
     trajectory::{Player, Sample},
+    wbc::RotationReference,
 };
 
 /// What comes from the operator in one control step.
@@ -33,10 +31,14 @@ pub struct Operator<'a> {
 pub struct Driving {
     limits: Limits,
     torso: DrivenBody,
-    gripper: DrivenBody,
-    gripper_start: Vector3<f64>,
-    reach: Reach,
-    /// What moves torso and gripper in place of the operator's displacements.
+    /// The end effector in manipulation; on four feet there is none.
+    effector: Option<Effector>,
+    /// Its pose; of a foot, the position.
+    limb: DrivenBody,
+    limb_start: Vector3<f64>,
+    gripper_reach: Reach,
+    foot_reach: FootReach,
+    /// What moves torso and end effector in place of the operator's displacements.
     player: Option<Player>,
     opening: [f64; 2],
     opening_goal: [f64; 2],
@@ -48,9 +50,11 @@ impl Driving {
         let still = PoseReference::hold(&Isometry3::identity());
         Self {
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
-            gripper: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
-            gripper_start: Vector3::zeros(),
-            reach: Reach::new(Side::Right, posture, limits.reach),
+            effector: None,
+            limb: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
+            limb_start: Vector3::zeros(),
+            gripper_reach: Reach::new(Side::Right, posture, limits.reach),
+            foot_reach: FootReach::new(Side::Right.leg(), posture, limits.reach),
             player: None,
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
@@ -65,37 +69,51 @@ impl Driving {
 
     /// Takes over the torso on four feet.
     pub fn begin_stance(&mut self, setpoint: &Setpoint) {
+        self.effector = None;
         self.begin_torso(setpoint, self.limits.stance_torso_rate);
+    }
+
+    /// Takes over torso and foot, as its reference moves.
+    pub fn begin_foot(&mut self, side: Side, setpoint: &mut Setpoint, scene: &Scene<'_>) {
+        self.effector = Some(Effector::Foot(side));
+        self.begin_torso(setpoint, self.limits.gripper_torso_rate);
+        let torso_from_foot = torso_from_frame(scene.model, scene.desired, Frame::Foot(side.leg()));
+        let mut foot = PoseReference::hold(&(setpoint.torso.pose() * torso_from_foot));
+        foot.point = setpoint.foot(side.leg()).copied().unwrap_or(foot.point);
+        self.begin_limb(foot);
+        self.foot_reach = FootReach::new(side.leg(), scene.desired, self.limits.reach);
+        setpoint.lift(side, foot.point);
     }
 
     /// Takes over torso and gripper; the gripper begins where the desired joints hold it.
     pub fn begin_gripper(&mut self, side: Side, setpoint: &mut Setpoint, scene: &Scene<'_>) {
+        self.effector = Some(Effector::Gripper(side));
         self.begin_torso(setpoint, self.limits.gripper_torso_rate);
         let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
         let gripper = PoseReference::hold(&(setpoint.torso.pose() * torso_from_gripper));
-        self.gripper = DrivenBody::new(gripper, self.limits.follower_rad_s, self.limits.gripper_rate);
-        self.gripper_start = gripper.point.position;
-        self.reach = Reach::new(side, scene.desired, self.limits.reach);
-        setpoint.arms[side.index()] = ArmGoal::Gripper(gripper);
+        self.begin_limb(gripper);
+        self.gripper_reach = Reach::new(side, scene.desired, self.limits.reach);
+        setpoint.grasp(side, gripper);
+    }
+
+    fn begin_limb(&mut self, reference: PoseReference) {
+        self.limb = DrivenBody::new(reference, self.limits.follower_rad_s, self.limits.gripper_rate);
+        self.limb_start = reference.point.position;
     }
 
     fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits) {
         self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
     }
 
-    /// One step of torso and, if a side is given, its gripper.
-    pub fn step(
-        &mut self,
-        side: Option<Side>,
-        operator: &Operator<'_>,
-        scene: &Scene<'_>,
-        setpoint: &mut Setpoint,
-    ) {
-        self.listen(side, operator, scene);
+    /// One step of torso and end effector.
+    pub fn step(&mut self, operator: &Operator<'_>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        self.listen(operator, scene);
         let played = self.player.as_ref().map(Player::sample);
-        self.move_torso(side.is_some(), played.as_ref(), scene, setpoint);
-        if let Some(side) = side {
-            self.move_gripper(side, played.as_ref(), scene, setpoint);
+        self.move_torso(played.as_ref(), scene, setpoint);
+        match self.effector {
+            None => {}
+            Some(Effector::Foot(side)) => self.move_foot(side, played.as_ref(), scene, setpoint),
+            Some(Effector::Gripper(side)) => self.move_gripper(side, played.as_ref(), scene, setpoint),
         }
     }
 
@@ -107,7 +125,7 @@ impl Driving {
         }
     }
 
-    fn listen(&mut self, side: Option<Side>, operator: &Operator<'_>, scene: &Scene<'_>) {
+    fn listen(&mut self, operator: &Operator<'_>, scene: &Scene<'_>) {
         let Some((command, grip)) = operator.command else { return self.release() };
         if let Some(player) = &mut self.player {
             player.advance(grip == Grip::Holds, scene.dt_s);
@@ -117,7 +135,7 @@ impl Driving {
             Grip::Released => return self.release(),
             Grip::Begins => {
                 self.torso.engage();
-                self.gripper.engage();
+                self.limb.engage();
                 self.player = command.trajectory.as_ref().map(Player::new);
             }
             Grip::Resumes => self.release(),
@@ -129,28 +147,30 @@ impl Driving {
             return;
         }
         self.torso.displace(command.torso.as_ref(), operator.clock, scene.now_ns);
-        if let Some(side) = side {
-            let (palm, opening) = (command.palms[side.index()], command.opening[side.index()]);
-            self.gripper.displace(palm.as_ref(), operator.clock, scene.now_ns);
-            self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
+        match self.effector {
+            None => {}
+            Some(Effector::Foot(side)) => {
+                let palm = command.palms[side.index()].map(|palm| Isometry3::from(palm.translation));
+                self.limb.displace(palm.as_ref(), operator.clock, scene.now_ns);
+            }
+            Some(Effector::Gripper(side)) => {
+                let (palm, opening) = (command.palms[side.index()], command.opening[side.index()]);
+                self.limb.displace(palm.as_ref(), operator.clock, scene.now_ns);
+                self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
+            }
         }
     }
 
     fn release(&mut self) {
         self.torso.release();
-        self.gripper.release();
+        self.limb.release();
         self.player = None;
     }
 
     /// The torso, within its range, with the centre of mass over the feet.
-    fn move_torso(
-        &mut self,
-        manipulating: bool,
-        played: Option<&Sample>,
-        scene: &Scene<'_>,
-        setpoint: &mut Setpoint,
-    ) {
-        let range = if manipulating { self.limits.gripper_torso } else { self.limits.stance_torso };
+    fn move_torso(&mut self, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        let range =
+            if self.effector.is_some() { self.limits.gripper_torso } else { self.limits.stance_torso };
         let margin_m = self.limits.support_margin_m;
         let (feet, count) = scene.standing_feet(&setpoint.contacts);
         let com_from_torso = from_above(&(scene.com - scene.state.world_from_torso.translation.vector));
@@ -168,6 +188,29 @@ impl Driving {
         setpoint.torso = *self.torso.reference();
     }
 
+    /// The foot, within its box, above the ground, within reach.
+    fn move_foot(&mut self, side: Side, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        let (range, start) = (self.limits.foot, self.limb_start);
+        let lowest = scene.ground(&setpoint.contacts) + self.limits.foot_clearance_m;
+        let (reach, world_from_torso) = (&mut self.foot_reach, setpoint.torso.pose());
+        let permitted = |wanted: &Isometry3<f64>| {
+            let mut position = range.clamp(&wanted.translation.vector, &start, side);
+            position.z = position.z.max(lowest);
+            let inside = world_from_torso.inverse_transform_point(&position.into());
+            let nearest = world_from_torso * reach.nearest(scene.model, &inside);
+            Isometry3::from_parts(nearest.into(), wanted.rotation)
+        };
+        match played {
+            Some(sample) => {
+                let mut foot = sample.limbs[side.index()];
+                foot.rotation = RotationReference::hold(UnitQuaternion::identity());
+                self.limb.advance_along(&foot, scene.dt_s, permitted);
+            }
+            None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
+        }
+        setpoint.lift(side, self.limb.reference().point);
+    }
+
     /// The gripper, within its box, above the ground, within reach.
     fn move_gripper(
         &mut self,
@@ -176,12 +219,11 @@ impl Driving {
         scene: &Scene<'_>,
         setpoint: &mut Setpoint,
     ) {
-        let outward = if side == Side::Left { 1.0 } else { -1.0 };
-        let (limits, start) = (self.limits.gripper, self.gripper_start);
+        let (range, start) = (self.limits.gripper, self.limb_start);
         let lowest = self.lowest_gripper(side, scene, setpoint);
-        let (reach, world_from_torso) = (&mut self.reach, setpoint.torso.pose());
+        let (reach, world_from_torso) = (&mut self.gripper_reach, setpoint.torso.pose());
         let permitted = |wanted: &Isometry3<f64>| {
-            let mut position = limits.clamp(&wanted.translation.vector, &start, outward);
+            let mut position = range.clamp(&wanted.translation.vector, &start, side);
             position.z = position.z.max(lowest);
             let inside = Isometry3::from_parts(position.into(), wanted.rotation);
             world_from_torso * reach.nearest(scene.model, &world_from_torso.inv_mul(&inside))
@@ -190,11 +232,11 @@ impl Driving {
             Some(sample) => {
                 let place = side.index();
                 self.opening_goal[place] = sample.opening[place].unwrap_or(self.opening_goal[place]);
-                self.gripper.advance_along(&sample.limbs[place], scene.dt_s, permitted);
+                self.limb.advance_along(&sample.limbs[place], scene.dt_s, permitted);
             }
-            None => self.gripper.advance(scene.now_ns, scene.dt_s, permitted),
+            None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
         }
-        setpoint.arms[side.index()] = ArmGoal::Gripper(*self.gripper.reference());
+        setpoint.grasp(side, *self.limb.reference());
     }
 
     /// Lowest height of a gripper's target at which neither it nor the foot behind it touches the ground.
@@ -206,16 +248,8 @@ impl Driving {
             let torso_from_frame = torso_from_frame(scene.model, scene.desired, frame);
             (setpoint.torso.pose() * torso_from_frame).translation.z
         };
-        let (mut ground, mut count) = (0.0, 0.0);
-        for leg in setpoint.contacts.legs() {
-            ground += scene.foot(leg).z;
-            count += 1.0;
-        }
-        if count == 0.0 {
-            return f64::NEG_INFINITY;
-        }
-        // Of the centres of feet that stand: a foot at this height touches the ground.
-        let ground = ground / count;
+        // A foot at this height touches the ground.
+        let ground = scene.ground(&setpoint.contacts);
         let gripper = height(Frame::Gripper(side));
         let foot_room = height(Frame::Foot(side.leg())) - ground - self.limits.foot_clearance_m;
         let gripper_room = gripper - ground - self.limits.gripper_clearance_m;

@@ -1,7 +1,7 @@
 //! The state machine of modes: decides what to do next, and nothing else. It has no clock and does no I/O:
 //! the same state and inputs always give the same next state.
 
-use super::mode::{Mode, Phase};
+use super::mode::{Effector, Mode, Phase};
 use crate::{joints::Side, supervisor::Severity};
 
 /// Why a request was refused.
@@ -120,7 +120,7 @@ impl Machine {
         if inputs.tilted && !lowers {
             return Request::Refused(Refusal::Tilted);
         }
-        if inputs.control_fault && matches!(mode, Mode::Gripper(_)) {
+        if inputs.control_fault && mode.effector().is_some() {
             return Request::Refused(Refusal::Control);
         }
         Request::Accepted(mode)
@@ -144,7 +144,7 @@ impl Machine {
         match severity {
             Severity::None | Severity::Warn | Severity::Hold | Severity::Disengage => {}
             Severity::Stand => {
-                if matches!(self.goal, Mode::Gripper(_)) {
+                if self.goal.effector().is_some() {
                     self.goal = Mode::Stance;
                 }
             }
@@ -160,10 +160,8 @@ impl Machine {
     /// The phase after this one; sets the mode where it arrives.
     fn next(&mut self, inputs: &Inputs) -> Phase {
         let lowers = matches!(self.goal, Mode::Damped | Mode::LieDown);
-        let side_wanted = match self.goal {
-            Mode::Gripper(side) => Some(side),
-            _ => None,
-        };
+        let wanted = self.goal.effector();
+        let wanted_of = |side: Side| wanted.filter(|effector| effector.side() == side);
         match self.phase {
             Phase::Damped if lowers => {
                 self.mode = self.goal;
@@ -177,29 +175,33 @@ impl Machine {
                 Phase::Stance
             }
             Phase::Stance if lowers => Phase::LieDown,
-            Phase::Stance => side_wanted.map_or(Phase::Stance, Phase::ShiftTorso),
-            Phase::ShiftTorso(side) if side_wanted != Some(side) => {
-                self.turn_back(Mode::Gripper(side), Phase::Recentre)
+            Phase::Stance => wanted.map_or(Phase::Stance, Phase::ShiftTorso),
+            Phase::ShiftTorso(effector) if wanted != Some(effector) => {
+                self.turn_back(effector.mode(), Phase::Recentre)
             }
-            Phase::ShiftTorso(side) if inputs.arrived => Phase::LiftFoot(side),
-            Phase::LiftFoot(side) if side_wanted != Some(side) => {
-                let back = if inputs.airborne { Phase::Stow(side) } else { Phase::Recentre };
-                self.turn_back(Mode::Gripper(side), back)
+            Phase::ShiftTorso(effector) if inputs.arrived => Phase::LiftFoot(effector),
+            Phase::LiftFoot(effector) if wanted != Some(effector) => {
+                let back = if inputs.airborne { Phase::Stow(effector.side()) } else { Phase::Recentre };
+                self.turn_back(effector.mode(), back)
             }
-            Phase::LiftFoot(side) if inputs.arrived => {
-                self.mode = Mode::Gripper(side);
-                Phase::SingleGripper(side)
-            }
-            Phase::SingleGripper(side) if side_wanted != Some(side) => Phase::Stow(side),
-            Phase::Stow(side) if inputs.arrived => {
-                if side_wanted == Some(side) {
-                    Phase::LiftFoot(side)
-                } else {
-                    Phase::LowerFoot(side)
+            Phase::LiftFoot(effector) if inputs.arrived => {
+                self.mode = effector.mode();
+                match effector {
+                    Effector::Foot(side) => Phase::SingleFoot(side),
+                    Effector::Gripper(side) => Phase::SingleGripper(side),
                 }
             }
+            Phase::SingleFoot(side) if wanted != Some(Effector::Foot(side)) => Phase::Stow(side),
+            Phase::SingleGripper(side) if wanted != Some(Effector::Gripper(side)) => Phase::Stow(side),
+            // The foot is above its landing point and the arm folded: from here it goes down, or up again for
+            // either end effector of this side.
+            Phase::Stow(side) if inputs.arrived => {
+                wanted_of(side).map_or(Phase::LowerFoot(side), Phase::LiftFoot)
+            }
             Phase::LowerFoot(_) if inputs.arrived => Phase::Recentre,
-            Phase::LowerFoot(side) if inputs.airborne && side_wanted == Some(side) => Phase::LiftFoot(side),
+            Phase::LowerFoot(side) if inputs.airborne => {
+                wanted_of(side).map_or(Phase::LowerFoot(side), Phase::LiftFoot)
+            }
             Phase::LieDown if !lowers => self.turn_back(Mode::LieDown, Phase::StandUp),
             Phase::LieDown if inputs.arrived => {
                 self.mode = self.goal;

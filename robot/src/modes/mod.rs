@@ -3,11 +3,12 @@
 //! ```text
 //!            ┌────────────── lie down ◄──────────────┐
 //!            ▼                                       │
-//! damped ─► stand up ─► recentre ───────────────► stance ─► shift torso ─► lift foot ─► single gripper
-//!                          ▲                                     │             │             │
-//!                          ├─────────────────────────────────────┘             ▼             │
-//!                          └────────────────── lower foot ◄────────────────── stow ◄─────────┘
+//! damped ─► stand up ─► recentre ───────────────► stance ─► shift torso ─► lift foot ─► single foot or gripper
+//!                          ▲                                     │           ▲ │             │
+//!                          ├─────────────────────────────────────┘           │ ▼             │
+//!                          └────────────────── lower foot ◄───────────────── stow ◄──────────┘
 //! ```
+//! What the whole-body controller tracks in each of them is a row of a [`table`].
 //! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves, and where the
 //! operator moves, [`Driving`] does.
 
@@ -20,11 +21,12 @@ mod posture_motion;
 mod scene;
 mod setpoint;
 mod settings;
+pub mod table;
 
 pub use choreography::{Choreography, Progress};
 pub use driving::{Driving, Operator};
 pub use machine::{Inputs, Machine, Refusal, Request, Start};
-pub use mode::{Mode, Phase};
+pub use mode::{Effector, Mode, Phase};
 pub use scene::Scene;
-pub use setpoint::{ArmGoal, Setpoint};
+pub use setpoint::{ObjectiveList, Setpoint};
 pub use settings::{JointGains, MotionSettings, PoseSettings};

@@ -4,6 +4,32 @@ use locoman_protocol::messages;
 
 use crate::joints::Side;
 
+/// The end effector in manipulation: m in the paper's table of operation modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Effector {
+    /// A front foot.
+    Foot(Side),
+    /// A gripper, with the leg that carries it.
+    Gripper(Side),
+}
+
+impl Effector {
+    /// The side whose front foot lifts.
+    pub const fn side(self) -> Side {
+        match self {
+            Self::Foot(side) | Self::Gripper(side) => side,
+        }
+    }
+
+    /// The mode in which it is driven.
+    pub const fn mode(self) -> Mode {
+        match self {
+            Self::Foot(side) => Mode::Foot(side),
+            Self::Gripper(side) => Mode::Gripper(side),
+        }
+    }
+}
+
 /// What an operator may ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Mode {
@@ -11,6 +37,8 @@ pub enum Mode {
     Damped,
     /// Standing on four feet, the torso follows.
     Stance,
+    /// Standing on three feet, torso and the front foot in the air follow.
+    Foot(Side),
     /// Standing on three feet, torso and gripper follow.
     Gripper(Side),
     /// Lying on the belly, then damped.
@@ -18,12 +46,23 @@ pub enum Mode {
 }
 
 impl Mode {
+    /// The end effector that is driven.
+    pub const fn effector(self) -> Option<Effector> {
+        match self {
+            Self::Foot(side) => Some(Effector::Foot(side)),
+            Self::Gripper(side) => Some(Effector::Gripper(side)),
+            Self::Damped | Self::Stance | Self::LieDown => None,
+        }
+    }
+
     /// From the wire; nothing for an unspecified mode.
     pub fn from_message(mode: messages::Mode) -> Option<Self> {
         match mode {
             messages::Mode::Unspecified => None,
             messages::Mode::Damped => Some(Self::Damped),
             messages::Mode::Stance => Some(Self::Stance),
+            messages::Mode::RightFoot => Some(Self::Foot(Side::Right)),
+            messages::Mode::LeftFoot => Some(Self::Foot(Side::Left)),
             messages::Mode::RightGripper => Some(Self::Gripper(Side::Right)),
             messages::Mode::LeftGripper => Some(Self::Gripper(Side::Left)),
             messages::Mode::LieDown => Some(Self::LieDown),
@@ -35,6 +74,8 @@ impl Mode {
         match self {
             Self::Damped => messages::Mode::Damped,
             Self::Stance => messages::Mode::Stance,
+            Self::Foot(Side::Right) => messages::Mode::RightFoot,
+            Self::Foot(Side::Left) => messages::Mode::LeftFoot,
             Self::Gripper(Side::Right) => messages::Mode::RightGripper,
             Self::Gripper(Side::Left) => messages::Mode::LeftGripper,
             Self::LieDown => messages::Mode::LieDown,
@@ -53,13 +94,15 @@ pub enum Phase {
     Recentre,
     /// On four feet, the operator moves the torso.
     Stance,
-    /// On four feet: the torso goes back and away from the leg that is to lift.
-    ShiftTorso(Side),
-    /// The leg is unloaded and lifted, its arm unfolds.
-    LiftFoot(Side),
+    /// On four feet: the centre of mass goes to where the other three feet carry it.
+    ShiftTorso(Effector),
+    /// The leg is unloaded and lifted; for a gripper, its arm unfolds.
+    LiftFoot(Effector),
+    /// On three feet, the operator moves torso and foot.
+    SingleFoot(Side),
     /// On three feet, the operator moves torso and gripper.
     SingleGripper(Side),
-    /// The arm folds, the foot stays in the air.
+    /// The leg goes back to above its landing point, its arm folds.
     Stow(Side),
     /// The foot goes down until it carries load.
     LowerFoot(Side),
@@ -69,15 +112,21 @@ pub enum Phase {
 
 impl Phase {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 21] = [
         Self::Damped,
         Self::StandUp,
         Self::Recentre,
         Self::Stance,
-        Self::ShiftTorso(Side::Right),
-        Self::ShiftTorso(Side::Left),
-        Self::LiftFoot(Side::Right),
-        Self::LiftFoot(Side::Left),
+        Self::ShiftTorso(Effector::Foot(Side::Right)),
+        Self::ShiftTorso(Effector::Foot(Side::Left)),
+        Self::ShiftTorso(Effector::Gripper(Side::Right)),
+        Self::ShiftTorso(Effector::Gripper(Side::Left)),
+        Self::LiftFoot(Effector::Foot(Side::Right)),
+        Self::LiftFoot(Effector::Foot(Side::Left)),
+        Self::LiftFoot(Effector::Gripper(Side::Right)),
+        Self::LiftFoot(Effector::Gripper(Side::Left)),
+        Self::SingleFoot(Side::Right),
+        Self::SingleFoot(Side::Left),
         Self::SingleGripper(Side::Right),
         Self::SingleGripper(Side::Left),
         Self::Stow(Side::Right),
@@ -96,6 +145,7 @@ impl Phase {
             Self::Stance => "stance",
             Self::ShiftTorso(_) => "shift torso",
             Self::LiftFoot(_) => "lift foot",
+            Self::SingleFoot(_) => "single foot",
             Self::SingleGripper(_) => "single gripper",
             Self::Stow(_) => "stow",
             Self::LowerFoot(_) => "lower foot",
@@ -114,6 +164,7 @@ impl Phase {
             self,
             Self::ShiftTorso(_)
                 | Self::LiftFoot(_)
+                | Self::SingleFoot(_)
                 | Self::SingleGripper(_)
                 | Self::Stow(_)
                 | Self::LowerFoot(_)
@@ -122,6 +173,6 @@ impl Phase {
 
     /// The operator moves the robot.
     pub const fn is_driven(self) -> bool {
-        matches!(self, Self::Stance | Self::SingleGripper(_))
+        matches!(self, Self::Stance | Self::SingleFoot(_) | Self::SingleGripper(_))
     }
 }

@@ -71,6 +71,16 @@ impl Scene<'_> {
         (feet, count)
     }
 
+    /// Mean height of the centres of the feet that stand; without any there is no ground.
+    pub fn ground(&self, contacts: &ContactSet) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for leg in contacts.legs() {
+            sum += self.foot(leg).z;
+            count += 1.0;
+        }
+        if count == 0.0 { f64::NEG_INFINITY } else { sum / count }
+    }
+
     /// Whether the centre of mass is at least so far inside the feet that stay when one front foot lifts.
     pub fn may_lift(&self, side: Side, margin_m: f64) -> bool {
         let (feet, count) = self.standing_feet(&ContactSet::without(side.leg()));

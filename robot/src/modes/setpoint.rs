@@ -2,36 +2,29 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::table::{self, MAX_OBJECTIVES, Row};
 use crate::{
     commander::{PoseReference, rebased_point},
     joints::{Leg, Side},
-    wbc::{ContactSet, Objective, PointReference},
+    wbc::{ContactSet, Objective, ObjectiveKind, PointReference},
 };
 
-/// What an arm and its leg, if that is in the air, are for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ArmGoal {
-    /// Keep these joint angles.
-    Posture(PointReference),
-    /// Keep these joint angles; the foot is in the air, at this place in the world.
-    PostureAndFoot(PointReference, PointReference),
-    /// Bring the gripper there, with leg and arm.
-    Gripper(PoseReference),
-}
-
-/// References of torso, feet and arms in the world, and the feet that stand.
+/// References of all bodies, which of them are in force, and the feet that stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint {
-    /// Torso.
+    /// What is tracked.
+    row: &'static Row,
+    /// Torso in the world.
     pub torso: PoseReference,
-    /// Arms right, left.
-    pub arms: [ArmGoal; 2],
+    /// Feet in the world.
+    feet: [PointReference; 4],
+    /// Grippers right, left in the world.
+    grippers: [PoseReference; 2],
+    /// Joints of the arms right, left.
+    arms: [PointReference; 2],
     /// Feet that stand.
     pub contacts: ContactSet,
 }
-
-/// The most objectives that a set-point makes.
-pub const MAX_OBJECTIVES: usize = 6;
 
 /// Objectives in order of priority.
 #[derive(Debug, Clone, Copy)]
@@ -41,18 +34,6 @@ pub struct ObjectiveList {
 }
 
 impl ObjectiveList {
-    fn new() -> Self {
-        let filler = Objective::TorsoPosition(PointReference::hold(Vector3::zeros()));
-        Self { objectives: [filler; MAX_OBJECTIVES], count: 0 }
-    }
-
-    fn push(&mut self, objective: Objective) {
-        if let Some(place) = self.objectives.get_mut(self.count) {
-            *place = objective;
-            self.count += 1;
-        }
-    }
-
     /// The most important first.
     pub fn as_slice(&self) -> &[Objective] {
         &self.objectives[..self.count]
@@ -63,35 +44,82 @@ impl Setpoint {
     /// Four feet, arms held.
     pub fn standing(torso: &Isometry3<f64>, arms: [Vector3<f64>; 2]) -> Self {
         Self {
+            row: &table::STANCE,
             torso: PoseReference::hold(torso),
-            arms: arms.map(|arm| ArmGoal::Posture(PointReference::hold(arm))),
-            contacts: ContactSet::STANCE,
+            feet: [PointReference::hold(Vector3::zeros()); 4],
+            grippers: [PoseReference::hold(torso); 2],
+            arms: arms.map(PointReference::hold),
+            contacts: table::STANCE.contacts(),
         }
     }
 
-    /// The paper's table of priorities: torso position, torso orientation, foot or gripper position, gripper
-    /// orientation, postures.
-    pub fn objectives(&self) -> ObjectiveList {
-        let mut list = ObjectiveList::new();
-        list.push(Objective::TorsoPosition(self.torso.point));
-        list.push(Objective::TorsoOrientation(self.torso.rotation));
-        for side in Side::ALL {
-            match self.arms[side.index()] {
-                ArmGoal::Gripper(gripper) => {
-                    list.push(Objective::GripperPosition(side, gripper.point));
-                    list.push(Objective::GripperOrientation(side, gripper.rotation));
-                }
-                ArmGoal::PostureAndFoot(_, foot) => list.push(Objective::FootPosition(side.leg(), foot)),
-                ArmGoal::Posture(_) => {}
+    /// What is tracked.
+    pub fn row(&self) -> &'static Row {
+        self.row
+    }
+
+    /// Four feet are on the ground.
+    pub fn stand(&mut self) {
+        self.row = &table::STANCE;
+    }
+
+    /// A front foot is in the air, there; its arm keeps its posture.
+    pub fn lift(&mut self, side: Side, foot: PointReference) {
+        self.row = &table::SINGLE_FOOT[side.index()];
+        self.feet[side.leg().index()] = foot;
+    }
+
+    /// Leg and arm bring a gripper there.
+    pub fn grasp(&mut self, side: Side, gripper: PoseReference) {
+        self.row = &table::SINGLE_GRIPPER[side.index()];
+        self.grippers[side.index()] = gripper;
+    }
+
+    /// The joints of an arm, for when its posture is in force.
+    pub fn hold_arm(&mut self, side: Side, posture: PointReference) {
+        self.arms[side.index()] = posture;
+    }
+
+    /// Reference of a gripper that is tracked.
+    pub fn gripper(&self, side: Side) -> Option<&PoseReference> {
+        self.row.controls(ObjectiveKind::GripperPosition(side)).then_some(&self.grippers[side.index()])
+    }
+
+    /// Reference of a foot that is tracked.
+    pub fn foot(&self, leg: Leg) -> Option<&PointReference> {
+        self.row.controls(ObjectiveKind::FootPosition(leg)).then_some(&self.feet[leg.index()])
+    }
+
+    /// Reference of an arm whose posture is held.
+    pub fn arm(&self, side: Side) -> Option<&PointReference> {
+        self.row.controls(ObjectiveKind::ArmPosture(side)).then_some(&self.arms[side.index()])
+    }
+
+    /// An objective with its reference.
+    fn objective(&self, kind: ObjectiveKind) -> Objective {
+        match kind {
+            ObjectiveKind::TorsoPosition => Objective::TorsoPosition(self.torso.point),
+            ObjectiveKind::TorsoOrientation => Objective::TorsoOrientation(self.torso.rotation),
+            ObjectiveKind::FootPosition(leg) => Objective::FootPosition(leg, self.feet[leg.index()]),
+            ObjectiveKind::GripperPosition(side) => {
+                Objective::GripperPosition(side, self.grippers[side.index()].point)
             }
+            ObjectiveKind::GripperOrientation(side) => {
+                Objective::GripperOrientation(side, self.grippers[side.index()].rotation)
+            }
+            ObjectiveKind::ArmPosture(side) => Objective::ArmPosture(side, self.arms[side.index()]),
         }
-        for side in Side::ALL {
-            match self.arms[side.index()] {
-                ArmGoal::Posture(posture) | ArmGoal::PostureAndFoot(posture, _) => {
-                    list.push(Objective::ArmPosture(side, posture));
-                }
-                ArmGoal::Gripper(_) => {}
-            }
+    }
+
+    /// The row's objectives with their references.
+    pub fn objectives(&self) -> ObjectiveList {
+        let mut list = ObjectiveList {
+            objectives: [Objective::TorsoPosition(self.torso.point); MAX_OBJECTIVES],
+            count: 0,
+        };
+        for (place, kind) in list.objectives.iter_mut().zip(self.row.objectives) {
+            *place = self.objective(*kind);
+            list.count += 1;
         }
         list
     }
@@ -101,22 +129,9 @@ impl Setpoint {
     pub fn rebased(&self, new_from_old: &Isometry3<f64>) -> Self {
         Self {
             torso: self.torso.rebased(new_from_old),
-            arms: self.arms.map(|arm| match arm {
-                ArmGoal::Posture(posture) => ArmGoal::Posture(posture),
-                ArmGoal::PostureAndFoot(posture, foot) => {
-                    ArmGoal::PostureAndFoot(posture, rebased_point(&foot, new_from_old))
-                }
-                ArmGoal::Gripper(gripper) => ArmGoal::Gripper(gripper.rebased(new_from_old)),
-            }),
-            contacts: self.contacts,
-        }
-    }
-
-    /// Target of a gripper, if it has one.
-    pub fn gripper(&self, side: Side) -> Option<&PoseReference> {
-        match &self.arms[side.index()] {
-            ArmGoal::Gripper(gripper) => Some(gripper),
-            _ => None,
+            feet: self.feet.map(|foot| rebased_point(&foot, new_from_old)),
+            grippers: self.grippers.map(|gripper| gripper.rebased(new_from_old)),
+            ..*self
         }
     }
 

@@ -15,6 +15,11 @@ impl ContactSet {
     /// All four feet in full contact.
     pub const STANCE: Self = Self { share: [1.0; 4] };
 
+    /// These feet in full contact.
+    pub fn of(legs: &[Leg]) -> Self {
+        legs.iter().fold(Self { share: [0.0; 4] }, |contacts, leg| contacts.with_share(*leg, 1.0))
+    }
+
     /// All feet but one in full contact.
     pub fn without(leg: Leg) -> Self {
         Self::STANCE.with_share(leg, 0.0)

@@ -121,7 +121,8 @@ impl Drive {
     }
 
     fn stands(&self) -> bool {
-        [Mode::Stance, Mode::RightGripper, Mode::LeftGripper].into_iter().any(|mode| self.has_reached(mode))
+        let modes = [Mode::Stance, Mode::RightGripper, Mode::LeftGripper, Mode::RightFoot, Mode::LeftFoot];
+        modes.into_iter().any(|mode| self.has_reached(mode))
     }
 
     fn has_reached(&self, mode: Mode) -> bool {

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use locoman_protocol::messages::SimTruth;
 use locoman_protocol::{Link, LinkError, geometry};
+use nalgebra::Isometry3;
 use triple_buffer::Output;
 
 use super::server::Counters;
@@ -41,6 +42,8 @@ pub fn publish(
 /// The truth as a message; the header is the sender's business.
 pub fn message(truth: &Truth) -> SimTruth {
     let [right_gripper, left_gripper] = truth.world_from_gripper.map(|pose| Some(geometry::pose(&pose)));
+    let [right_foot, left_foot, ..] =
+        truth.feet_in_world.map(|foot| Some(geometry::pose(&Isometry3::from(foot.coords))));
     let [right_opening, left_opening] = truth.opening;
     SimTruth {
         header: None,
@@ -48,6 +51,8 @@ pub fn message(truth: &Truth) -> SimTruth {
         torso: Some(geometry::pose(&truth.world_from_torso)),
         right_gripper,
         left_gripper,
+        right_foot,
+        left_foot,
         joint_position_rad: truth.joint_position.iter().copied().collect(),
         foot_force_n: truth.foot_force_n.to_vec(),
         right_opening,

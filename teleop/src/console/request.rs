@@ -26,6 +26,8 @@ pub(super) enum ModeName {
     Stance,
     RightGripper,
     LeftGripper,
+    RightFoot,
+    LeftFoot,
     LieDown,
 }
 
@@ -35,6 +37,8 @@ impl From<ModeName> for Mode {
             ModeName::Stance => Self::Stance,
             ModeName::RightGripper => Self::RightGripper,
             ModeName::LeftGripper => Self::LeftGripper,
+            ModeName::RightFoot => Self::RightFoot,
+            ModeName::LeftFoot => Self::LeftFoot,
             ModeName::LieDown => Self::LieDown,
         }
     }
@@ -74,12 +78,12 @@ mod tests {
         assert_eq!(request(r#"{"mode":"right_gripper"}"#), Request::Mode(ModeName::RightGripper));
         assert_eq!(request(r#"{"stop":"settle"}"#), Request::Stop(StopName::Settle));
         assert_eq!(request(r#"{"auto":false}"#), Request::Auto(false));
-        let hand = r#"{"hand":{"held":true,"drive":"tracker","target":"gripper","linear":[1,0,-0.5],
+        let hand = r#"{"hand":{"held":true,"drive":"tracker","target":"effector","linear":[1,0,-0.5],
             "angular":[0,0,0],"opening":0.25}}"#;
         let expected = Hand {
             held: true,
             drive: Drive::Tracker,
-            target: Target::Gripper,
+            target: Target::Effector,
             linear: [1.0, 0.0, -0.5],
             angular: [0.0; 3],
             opening: 0.25,

@@ -48,6 +48,7 @@ struct Robot {
     torso: Option<PoseStatus>,
     torso_target: Option<PoseStatus>,
     gripper_targets: [Option<PoseStatus>; 2],
+    foot_targets: [Option<PoseStatus>; 2],
     /// Whether it obeys this station.
     ours: bool,
     command_age_ms: Option<f64>,
@@ -157,6 +158,7 @@ fn robot_status(robot: &Arc<Received<RobotState>>, source: u64) -> Robot {
         torso: pose(m.torso.as_ref()),
         torso_target: pose(m.torso_target.as_ref()),
         gripper_targets: [pose(m.right_gripper_target.as_ref()), pose(m.left_gripper_target.as_ref())],
+        foot_targets: [pose(m.right_foot_target.as_ref()), pose(m.left_foot_target.as_ref())],
         ours: m.command_source == source,
         command_age_ms: (m.command_received_ns > 0)
             .then(|| ms(robot.received_ns.saturating_sub(m.command_received_ns))),

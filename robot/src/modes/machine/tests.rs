@@ -57,8 +57,8 @@ fn from_lying_to_a_gripper_and_back_every_step_is_taken() {
             Phase::StandUp,
             Phase::Recentre,
             Phase::Stance,
-            Phase::ShiftTorso(right),
-            Phase::LiftFoot(right),
+            Phase::ShiftTorso(Effector::Gripper(right)),
+            Phase::LiftFoot(Effector::Gripper(right)),
             Phase::SingleGripper(right)
         ]
     );
@@ -78,6 +78,24 @@ fn from_lying_to_a_gripper_and_back_every_step_is_taken() {
 }
 
 #[test]
+fn from_foot_to_gripper_of_one_side_the_foot_stays_in_the_air() {
+    let mut sut = standing();
+    let side = Side::Left;
+    ask(&mut sut, Mode::Foot(side));
+    run(&mut sut, &calm());
+    assert_eq!((sut.phase(), sut.mode()), (Phase::SingleFoot(side), Mode::Foot(side)));
+    for (goal, last) in [
+        (Effector::Gripper(side), Phase::SingleGripper(side)),
+        (Effector::Foot(side), Phase::SingleFoot(side)),
+    ] {
+        ask(&mut sut, goal.mode());
+        let way = run(&mut sut, &calm());
+        assert_eq!(way, [Phase::Stow(side), Phase::LiftFoot(goal), last]);
+        assert_eq!(sut.mode(), goal.mode());
+    }
+}
+
+#[test]
 fn from_one_gripper_to_the_other_goes_through_stance() {
     let mut sut = standing();
     ask(&mut sut, Mode::Gripper(Side::Right));
@@ -93,7 +111,7 @@ fn a_changed_mind_turns_back_without_standing_on_a_foot_that_is_up() {
     let mut sut = standing();
     ask(&mut sut, Mode::Gripper(Side::Left));
     sut.step(&Inputs { arrived: true, ..calm() });
-    assert_eq!(sut.phase(), Phase::LiftFoot(Side::Left));
+    assert_eq!(sut.phase(), Phase::LiftFoot(Effector::Gripper(Side::Left)));
     ask(&mut sut, Mode::Stance);
     assert_eq!(sut.phase(), Phase::Stow(Side::Left));
     assert_ne!(sut.mode(), sut.goal(), "not there yet");
@@ -129,16 +147,19 @@ fn r_safe_012_while_stopping_nothing_else_is_accepted() {
     assert_eq!(run(&mut sut, &stopping).last(), Some(&Phase::Damped));
 }
 
+const MODES: [Mode; 7] = [
+    Mode::Damped,
+    Mode::Stance,
+    Mode::LieDown,
+    Mode::Foot(Side::Right),
+    Mode::Foot(Side::Left),
+    Mode::Gripper(Side::Right),
+    Mode::Gripper(Side::Left),
+];
+
 /// All states that any inputs can lead to within `depth` steps.
 fn reachable(from: Machine, depth: usize) -> HashSet<Machine> {
-    let modes = [
-        None,
-        Some(Mode::Damped),
-        Some(Mode::Stance),
-        Some(Mode::LieDown),
-        Some(Mode::Gripper(Side::Right)),
-        Some(Mode::Gripper(Side::Left)),
-    ];
+    let modes = MODES.into_iter().map(Some).chain([None]);
     let severities = [Severity::None, Severity::Stand, Severity::LieDown, Severity::Damp];
     let starts = [Start::Down, Start::Standing, Start::OnThree(Side::Right)];
     let mut known = HashSet::from([from]);
@@ -146,7 +167,7 @@ fn reachable(from: Machine, depth: usize) -> HashSet<Machine> {
     for _ in 0..depth {
         let mut next = Vec::new();
         for machine in frontier {
-            for request in modes {
+            for request in modes.clone() {
                 for severity in severities {
                     for start in starts {
                         for bits in 0..8 {
@@ -184,5 +205,39 @@ fn every_state_that_can_be_reached_can_lie_down_and_stand_up_again() {
         ask(&mut sut, Mode::Stance);
         run(&mut sut, &calm());
         assert_eq!(sut.phase(), Phase::Stance, "{state:?}");
+    }
+}
+
+/// A foot is in the air, or on its way there or back.
+fn lifted(phase: Phase) -> Option<Side> {
+    match phase {
+        Phase::LiftFoot(effector) => Some(effector.side()),
+        Phase::SingleFoot(side) | Phase::SingleGripper(side) | Phase::Stow(side) | Phase::LowerFoot(side) => {
+            Some(side)
+        }
+        _ => None,
+    }
+}
+
+#[test]
+fn from_every_state_every_mode_is_reached_without_a_step_from_foot_to_foot() {
+    for state in reachable(Machine::default(), 12) {
+        for mode in MODES {
+            let mut sut = state;
+            assert_eq!(ask(&mut sut, mode), None, "{state:?}");
+            let way = run(&mut sut, &calm());
+            assert_eq!((sut.mode(), sut.goal()), (mode, mode), "{state:?}: {way:?}");
+            for step in way.windows(2) {
+                let (from, to) = (lifted(step[0]), lifted(step[1]));
+                assert!(from.is_none() || to.is_none() || from == to, "{state:?}: {way:?}");
+                // A foot that is up comes down on its own way, and only then do others go up.
+                let down = matches!(step[0], Phase::LowerFoot(_) | Phase::LiftFoot(_));
+                assert!(from.is_none() || to.is_some() || down, "{state:?}: {way:?}");
+                // The arm is folded before the foot goes down.
+                if let Phase::LowerFoot(side) = step[1] {
+                    assert_eq!(step[0], Phase::Stow(side));
+                }
+            }
+        }
     }
 }

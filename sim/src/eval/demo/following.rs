@@ -29,17 +29,22 @@ pub enum Body {
     RightGripper,
     /// The left gripper, in its own mode.
     LeftGripper,
+    /// The right front foot, in its own mode.
+    RightFoot,
+    /// The left front foot, in its own mode.
+    LeftFoot,
 }
 
 impl Body {
-    /// All three.
-    pub const ALL: [Self; 3] = [Self::Torso, Self::RightGripper, Self::LeftGripper];
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Torso, Self::RightGripper, Self::LeftGripper, Self::RightFoot, Self::LeftFoot];
 
     fn displacement(self, command: &OperatorCommand) -> &Option<Pose> {
         match self {
             Self::Torso => &command.torso,
-            Self::RightGripper => &command.right_palm,
-            Self::LeftGripper => &command.left_palm,
+            Self::RightGripper | Self::RightFoot => &command.right_palm,
+            Self::LeftGripper | Self::LeftFoot => &command.left_palm,
         }
     }
 
@@ -48,6 +53,8 @@ impl Body {
             Self::Torso => &state.torso_target,
             Self::RightGripper => &state.right_gripper_target,
             Self::LeftGripper => &state.left_gripper_target,
+            Self::RightFoot => &state.right_foot_target,
+            Self::LeftFoot => &state.left_foot_target,
         }
     }
 
@@ -56,6 +63,8 @@ impl Body {
             Self::Torso => &state.torso,
             Self::RightGripper => &state.right_gripper,
             Self::LeftGripper => &state.left_gripper,
+            Self::RightFoot => &state.right_foot,
+            Self::LeftFoot => &state.left_foot,
         }
     }
 
@@ -64,14 +73,18 @@ impl Body {
             Self::Torso => &truth.torso,
             Self::RightGripper => &truth.right_gripper,
             Self::LeftGripper => &truth.left_gripper,
+            Self::RightFoot => &truth.right_foot,
+            Self::LeftFoot => &truth.left_foot,
         }
     }
 
     fn moves_in(self, mode: Mode) -> bool {
         match self {
-            Self::Torso => matches!(mode, Mode::Stance | Mode::RightGripper | Mode::LeftGripper),
+            Self::Torso => !matches!(mode, Mode::Unspecified | Mode::Damped | Mode::LieDown),
             Self::RightGripper => mode == Mode::RightGripper,
             Self::LeftGripper => mode == Mode::LeftGripper,
+            Self::RightFoot => mode == Mode::RightFoot,
+            Self::LeftFoot => mode == Mode::LeftFoot,
         }
     }
 }
@@ -109,12 +122,13 @@ pub struct Errors {
 pub struct Following {
     /// The delay that was taken out, s.
     pub delay_s: f64,
-    /// Command against truth, delay taken out: torso, grippers (both as one).
-    pub commanded: [Errors; 2],
+    /// Command against truth, delay taken out: torso, grippers (both as one), feet (both as one; of their angles
+    /// nothing is known).
+    pub commanded: [Errors; 3],
     /// The robot's smoothed target against the truth of the same instant.
-    pub target: [Errors; 2],
+    pub target: [Errors; 3],
     /// The robot's own estimate against the truth of the same instant.
-    pub estimate: [Errors; 2],
+    pub estimate: [Errors; 3],
     /// Time during which somebody moved the robot, s.
     pub engaged_s: f64,
 }
@@ -169,9 +183,13 @@ pub fn judge(session: &Session) -> Following {
     following
 }
 
-/// Index in arrays of torso and grippers.
+/// Index in arrays of torso, grippers and feet.
 fn group(body: Body) -> usize {
-    usize::from(body != Body::Torso)
+    match body {
+        Body::Torso => 0,
+        Body::RightGripper | Body::LeftGripper => 1,
+        Body::RightFoot | Body::LeftFoot => 2,
+    }
 }
 
 impl Errors {
@@ -291,7 +309,7 @@ fn origin(session: &Session, segment: &Segment<'_>, body: Body) -> Isometry3<f64
     applied.and_then(|command| isometry(body.displacement(command))).unwrap_or_else(Isometry3::identity)
 }
 
-fn error_after(wanted: &Expected, truths: &[Track; 3], delay_ns: u64) -> Option<Error> {
+fn error_after(wanted: &Expected, truths: &[Track; Body::ALL.len()], delay_ns: u64) -> Option<Error> {
     let time_ns = wanted.time_ns + delay_ns;
     if time_ns > wanted.until_ns {
         return None;
@@ -299,10 +317,10 @@ fn error_after(wanted: &Expected, truths: &[Track; 3], delay_ns: u64) -> Option<
     Some(between(&wanted.pose, &truths[wanted.body as usize].at(time_ns)?))
 }
 
-/// The delay at which the grippers' mean position error is smallest; the torso's if no gripper moved.
-fn best_delay(expected: &[Expected], truths: &[Track; 3]) -> u64 {
-    let gripper_moves = expected.iter().any(|wanted| wanted.body != Body::Torso);
-    let counts = |wanted: &&Expected| (wanted.body != Body::Torso) == gripper_moves;
+/// The delay at which the limbs' mean position error is smallest; the torso's if no limb moved.
+fn best_delay(expected: &[Expected], truths: &[Track; Body::ALL.len()]) -> u64 {
+    let limb_moves = expected.iter().any(|wanted| wanted.body != Body::Torso);
+    let counts = |wanted: &&Expected| (wanted.body != Body::Torso) == limb_moves;
     let mean = |delay_ns: u64| {
         let errors =
             expected.iter().filter(counts).filter_map(|wanted| error_after(wanted, truths, delay_ns));

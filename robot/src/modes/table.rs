@@ -1,0 +1,174 @@
+//! The paper's table of operation modes: what each mode controls, the most important first, and which feet
+//! stand. It is data: a mode is a row here, and the way to it a few phases.
+//!
+//! The paper's table ends with the gripper's orientation. What it leaves free, the joints of stowed arms, is
+//! held by posture objectives after all of it, where they disturb nothing.
+
+use super::mode::Mode;
+use crate::{
+    joints::{Leg, Side},
+    wbc::{
+        ContactSet,
+        ObjectiveKind::{
+            self, ArmPosture, FootPosition, GripperOrientation, GripperPosition, TorsoOrientation,
+            TorsoPosition,
+        },
+    },
+};
+
+/// What the whole-body controller does in a mode.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Row {
+    /// The mode; on the way from one to another, the one whose objectives are in force.
+    pub mode: Mode,
+    /// What is tracked, the most important first.
+    pub objectives: &'static [ObjectiveKind],
+    /// The feet that stand.
+    pub stance: &'static [Leg],
+}
+
+impl Row {
+    /// The feet that stand, in full contact.
+    pub fn contacts(&self) -> ContactSet {
+        ContactSet::of(self.stance)
+    }
+
+    /// Whether something is tracked.
+    pub fn controls(&self, kind: ObjectiveKind) -> bool {
+        self.objectives.contains(&kind)
+    }
+}
+
+const ALL_BUT_FRONT_RIGHT: &[Leg] = &[Leg::FrontLeft, Leg::RearRight, Leg::RearLeft];
+const ALL_BUT_FRONT_LEFT: &[Leg] = &[Leg::FrontRight, Leg::RearRight, Leg::RearLeft];
+
+/// Standing on four feet.
+pub static STANCE: Row = Row {
+    mode: Mode::Stance,
+    objectives: &[TorsoPosition, TorsoOrientation, ArmPosture(Side::Right), ArmPosture(Side::Left)],
+    stance: &Leg::ALL,
+};
+
+/// Single-foot manipulation, right and left.
+pub static SINGLE_FOOT: [Row; 2] = [
+    Row {
+        mode: Mode::Foot(Side::Right),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            FootPosition(Leg::FrontRight),
+            ArmPosture(Side::Right),
+            ArmPosture(Side::Left),
+        ],
+        stance: ALL_BUT_FRONT_RIGHT,
+    },
+    Row {
+        mode: Mode::Foot(Side::Left),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            FootPosition(Leg::FrontLeft),
+            ArmPosture(Side::Right),
+            ArmPosture(Side::Left),
+        ],
+        stance: ALL_BUT_FRONT_LEFT,
+    },
+];
+
+/// Single-gripper manipulation, right and left.
+pub static SINGLE_GRIPPER: [Row; 2] = [
+    Row {
+        mode: Mode::Gripper(Side::Right),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            GripperPosition(Side::Right),
+            GripperOrientation(Side::Right),
+            ArmPosture(Side::Left),
+        ],
+        stance: ALL_BUT_FRONT_RIGHT,
+    },
+    Row {
+        mode: Mode::Gripper(Side::Left),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            GripperPosition(Side::Left),
+            GripperOrientation(Side::Left),
+            ArmPosture(Side::Right),
+        ],
+        stance: ALL_BUT_FRONT_LEFT,
+    },
+];
+
+/// All rows.
+pub static TABLE: [&Row; 5] =
+    [&STANCE, &SINGLE_FOOT[0], &SINGLE_FOOT[1], &SINGLE_GRIPPER[0], &SINGLE_GRIPPER[1]];
+
+/// The most objectives in a row.
+pub const MAX_OBJECTIVES: usize = 6;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modes::Effector;
+
+    /// One objective in the paper's words; nothing for what its table leaves out.
+    fn words(kind: &ObjectiveKind) -> Option<&'static str> {
+        match kind {
+            TorsoPosition => Some("Torso Position"),
+            TorsoOrientation => Some("Torso Orientation"),
+            FootPosition(_) => Some("Foot Position"),
+            GripperPosition(_) => Some("Gripper Position"),
+            GripperOrientation(_) => Some("Gripper Orientation"),
+            ArmPosture(_) => None,
+        }
+    }
+
+    #[test]
+    fn the_rows_are_those_of_the_papers_table_of_operation_modes() {
+        for row in TABLE {
+            let line: Vec<_> = row.objectives.iter().filter_map(words).collect();
+            let line = line.join(" | ");
+            println!("{:?}: {line}; {} feet", row.mode, row.stance.len());
+            let (paper, feet) = match row.mode {
+                Mode::Foot(_) => ("Torso Position | Torso Orientation | Foot Position", 3),
+                Mode::Gripper(_) => {
+                    ("Torso Position | Torso Orientation | Gripper Position | Gripper Orientation", 3)
+                }
+                // Not in the paper's table: where its switchers begin and end.
+                _ => ("Torso Position | Torso Orientation", 4),
+            };
+            assert_eq!((line.as_str(), row.stance.len()), (paper, feet));
+        }
+    }
+
+    #[test]
+    fn postures_come_last_and_nothing_that_stands_or_is_held_otherwise_is_moved() {
+        for row in TABLE {
+            assert!(row.objectives.len() <= MAX_OBJECTIVES);
+            let postures = |kind: &&ObjectiveKind| matches!(kind, ArmPosture(_));
+            let last = row.objectives.iter().rev().take_while(postures).count();
+            assert_eq!(last, row.objectives.iter().filter(postures).count(), "{:?}", row.mode);
+            for side in Side::ALL {
+                let gripper = row.controls(GripperPosition(side));
+                assert_ne!(gripper, row.controls(ArmPosture(side)), "{:?}", row.mode);
+                assert_eq!(gripper, row.controls(GripperOrientation(side)));
+                let foot = row.controls(FootPosition(side.leg()));
+                assert_ne!(row.stance.contains(&side.leg()), gripper || foot, "{:?}", row.mode);
+            }
+        }
+    }
+
+    #[test]
+    fn both_sides_have_the_same_row() {
+        for rows in [&SINGLE_FOOT, &SINGLE_GRIPPER] {
+            let [right, left] = rows.each_ref().map(|row| row.objectives.iter().filter_map(words));
+            assert!(right.eq(left));
+            assert_eq!(
+                rows.each_ref().map(|row| row.mode.effector().map(Effector::side)),
+                Side::ALL.map(Some)
+            );
+        }
+    }
+}
