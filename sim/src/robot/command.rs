@@ -31,7 +31,7 @@ pub struct Args {
     /// How it begins: a posture of scenes/robot.toml (`lying` or `standing`).
     #[arg(long, default_value = "lying")]
     pub posture: String,
-    /// Seed of the sensors' noise.
+    /// Seed of everything random: noise, and what the controller's model has wrong.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }

@@ -1,13 +1,17 @@
 //! The simulated robot: MuJoCo behind the same boundary as the real one.
 //!
 //! ```text
-//! configs/robot (URDF, drives) ─► mjcf ─► world (MuJoCo) ◄─ drives ◄─ machine ◄─ lockstep | real time
-//! configs/scenes/robot.toml ───────┴─────────────────────────┴──► noise ──┘        (tests)  (UDP, Zenoh)
+//! configs/robot ─► body ─► mjcf, rubber ─► world (MuJoCo) ◄─► drives, servo ◄─► machine ◄─► lockstep (tests)
+//!  (URDF, drives)                              ▲                               noise         server (UDP, Zenoh)
+//! configs/scenes/robot.toml: all of them       └─ disturbance
 //! ```
+//! What a profile of the scene file makes imperfect: the masses (`body`), friction and play (`mjcf`), the feet
+//! (`rubber`), the servos (`servo`), the wire (`go1_wire`), the sensors (`noise`).
 
 pub mod body;
 pub mod command;
 pub mod disturbance;
+mod disturbed;
 pub mod drives;
 mod error;
 pub mod go1_wire;
@@ -18,6 +22,7 @@ pub mod mjcf;
 pub mod noise;
 pub mod profile;
 pub mod publish;
+mod rubber;
 pub mod scene;
 pub mod server;
 pub mod servo;

@@ -2,16 +2,15 @@
 
 use std::sync::Arc;
 
-use locoman_robot::joints::{JOINTS, JointVector, Leg, Side};
+use locoman_robot::joints::{JOINTS, JointVector};
 use locoman_robot::model::JOINT_NAMES;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::SimRobotError;
-use super::disturbance::Target;
 use super::mjcf::{FOOT_NAMES, GRASP_NAMES, GRIPPER_NAMES, GROUND, JAW_NAMES, ROTOR, TRUNK};
 use super::profile::FootCompliance;
 use super::scene::Posture;
+use super::{SimRobotError, rubber};
 
 /// Motors: the joints, then the jaws right and left.
 pub const MOTORS: usize = JOINTS + 2;
@@ -24,9 +23,9 @@ const TRUNK_ANGULAR_VELOCITY: usize = 3;
 /// The physics.
 #[derive(Debug)]
 pub struct World {
-    data: MjData<Arc<MjModel>>,
+    pub(super) data: MjData<Arc<MjModel>>,
     /// The model without disturbances.
-    calm: Arc<MjModel>,
+    pub(super) calm: Arc<MjModel>,
     position_at: [usize; MOTORS],
     velocity_at: [usize; MOTORS],
     /// Where the motors are: the joints themselves, or rotors before the play of their gears.
@@ -34,14 +33,14 @@ pub struct World {
     rotor_velocity_at: [usize; MOTORS],
     partner_position_at: [usize; 2],
     foot_sites: [usize; 4],
-    foot_geoms: [usize; 4],
+    pub(super) foot_geoms: [usize; 4],
     gripper_sites: [usize; 2],
     /// Which foot a geom is, if it is one.
     foot_of_geom: Vec<Option<u8>>,
     is_trunk_geom: Vec<bool>,
     ground: i32,
-    trunk: usize,
-    grasps: [usize; 2],
+    pub(super) trunk: usize,
+    pub(super) grasps: [usize; 2],
 }
 
 /// What the simulator knows and no robot does. Poses map body points into the simulator's world.
@@ -110,7 +109,7 @@ impl World {
         let is_trunk_geom = model.geom_bodyid().iter().map(|&body| address(body) == trunk).collect();
         let ground = i32::try_from(id(&model, MjtObjBase::mjOBJ_GEOM, GROUND)?).unwrap_or_default();
         if feet.stiffness_n_m > 0.0 {
-            soften(&mut model, &foot_geoms, feet);
+            rubber::soften(&mut model, &foot_geoms, feet);
         }
         let calm = Arc::new(model);
         let data = MjData::try_new(Arc::clone(&calm)).map_err(mujoco)?;
@@ -244,54 +243,6 @@ impl World {
         self.data.time()
     }
 
-    /// A wrench on a target in world axes until changed, N and N m.
-    pub fn set_push(&mut self, target: Target, force: Vector3<f64>, torque: Vector3<f64>) {
-        // MuJoCo applies it at the body's centre of mass: the trunk's own, and the grasp centre.
-        let body = match target {
-            Target::Torso => self.trunk,
-            Target::Gripper(side) => self.grasps[side.index()],
-        };
-        self.data.xfrc_applied_mut()[body] = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
-    }
-
-    /// A cube of 40 mm in a gripper.
-    pub fn set_load(&mut self, side: Side, mass_kg: f64) -> Result<(), SimRobotError> {
-        /// Edge of the cube, m.
-        const EDGE: f64 = 0.04;
-        let grasp = self.grasps[side.index()];
-        let mut model = self.data.model().clone();
-        let more = mass_kg - model.body_mass()[grasp];
-        model.body_mass_mut()[grasp] = mass_kg;
-        model.body_inertia_mut()[grasp] = [mass_kg * EDGE * EDGE / 6.0; 3];
-        let mut body = grasp;
-        while body != 0 {
-            model.body_subtreemass_mut()[body] += more;
-            body = address(model.body_parentid()[body]);
-        }
-        self.disturbed(model)
-    }
-
-    /// Friction coefficient between these feet and the ground.
-    pub fn set_friction(&mut self, feet: &[Leg], coefficient: f64) -> Result<(), SimRobotError> {
-        let mut model = self.data.model().clone();
-        for foot in feet {
-            model.geom_friction_mut()[self.foot_geoms[foot.index()]][0] = coefficient;
-        }
-        self.disturbed(model)
-    }
-
-    /// Ends all disturbances.
-    pub fn calm(&mut self) -> Result<(), SimRobotError> {
-        self.data.xfrc_applied_mut().fill([0.0; 6]);
-        self.data.try_swap_model(Arc::clone(&self.calm)).map_err(mujoco)?;
-        Ok(())
-    }
-
-    fn disturbed(&mut self, model: MjModel) -> Result<(), SimRobotError> {
-        self.data.try_swap_model(Arc::new(model)).map_err(mujoco)?;
-        Ok(())
-    }
-
     /// Everything, exact. Brings the frames up to the present state first.
     pub fn truth(&mut self) -> Truth {
         self.data.kinematics();
@@ -311,24 +262,7 @@ impl World {
     }
 }
 
-/// Makes the feet's contacts springs and dampers.
-///
-/// A contact at rest obeys `k r = R f` with the regularisation `R = A (1 - d) / d`: `d` is the impedance
-/// (`solimp`), `A` the inverse mass that MuJoCo assumes for the contact (`body_invweight0`). `solref` given as
-/// `(-s, -c)` means `k = s d / d²` and, with speed `v`, `b = c / d`. So a foot sinks by `f / K` when
-/// `s = K A (1 - d)`, and likewise `c = C A (1 - d)`.
-fn soften(model: &mut MjModel, feet: &[usize; 4], rubber: &FootCompliance) {
-    /// Impedance. The contact has an inertia of `d / (1 - d) / A` of its own: small with a small one.
-    const IMPEDANCE: f64 = 0.2;
-    for &foot in feet {
-        let body = address(model.geom_bodyid()[foot]);
-        let unit = model.body_invweight0()[body][0] * (1.0 - IMPEDANCE);
-        model.geom_solref_mut()[foot] = [-unit * rubber.stiffness_n_m, -unit * rubber.damping_n_s_m];
-        model.geom_solimp_mut()[foot] = [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0];
-    }
-}
-
-fn mujoco(error: impl std::fmt::Display) -> SimRobotError {
+pub(super) fn mujoco(error: impl std::fmt::Display) -> SimRobotError {
     SimRobotError::MuJoCo(error.to_string())
 }
 
@@ -341,7 +275,7 @@ fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, SimRobotEr
 }
 
 /// MuJoCo's indices are `int`s that are never negative here.
-fn address(index: impl TryInto<usize>) -> usize {
+pub(super) fn address(index: impl TryInto<usize>) -> usize {
     index.try_into().unwrap_or_default()
 }
 
