@@ -24,7 +24,7 @@
 //!
 //! | suffix | priority | when the link is full | express | longest |
 //! |---|---|---|---|---|
-//! | `command`, `stop` | real time | drop | yes | 2 KiB |
+//! | `command`, `stop` | real time | drop | yes | 16 KiB |
 //! | `state`, `detections/*` | interactive high | drop | yes | 64 KiB |
 //! | `truth` | interactive low | drop | yes | 64 KiB |
 //! | `tracking` | data high | drop | yes | 64 KiB |
@@ -60,6 +60,7 @@ pub mod realtime;
 pub mod recording;
 pub mod sequence;
 pub mod topic;
+pub mod trajectory;
 pub mod validate;
 
 pub use link::{Endpoints, Link, LinkError, Received, Sender, Subscription};

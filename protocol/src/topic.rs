@@ -64,8 +64,8 @@ macro_rules! wire {
     )*};
 }
 
-/// Enough for a command or a stop with room for fields to come.
-pub(crate) const COMMAND_MAX_BYTES: usize = 2 * 1024;
+/// Enough for a command with a trajectory of 32 poses of three bodies (8 kB), with room for fields to come.
+pub(crate) const COMMAND_MAX_BYTES: usize = 16 * 1024;
 const STATE_MAX_BYTES: usize = 64 * 1024;
 
 wire! {

@@ -3,9 +3,12 @@
 //! Pure, so that both sides and the tests judge alike. Workspace, step and rate limits are the robot's.
 
 use crate::geometry::{self, PoseError};
-use crate::messages::{Device, Mode, OperatorCommand};
+use crate::messages::{Device, Mode, OperatorCommand, Pose, Trajectory};
 use crate::topic::COMMAND_MAX_BYTES;
 use prost::Message;
+
+/// The most waypoints of a trajectory.
+pub const MAX_WAYPOINTS: usize = 32;
 
 /// Why a command is refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -41,6 +44,22 @@ pub enum Rejection {
     /// A device that this version does not know.
     #[error("device {0} is not known")]
     Device(i32),
+    /// A trajectory without waypoints, or with too many.
+    #[error("the trajectory has {count} waypoints, not 1 to {MAX_WAYPOINTS}")]
+    Waypoints {
+        /// How many it has.
+        count: usize,
+    },
+    /// A time that is no number or not after the one before.
+    #[error("waypoint {number} is at {time_s} s, not after {after_s} s")]
+    Time {
+        /// Counted from 1.
+        number: usize,
+        /// As received.
+        time_s: f64,
+        /// That of the waypoint before; 0 for the first.
+        after_s: f64,
+    },
 }
 
 /// Accepts a command whose every number can be used, else says why not.
@@ -52,32 +71,71 @@ pub fn validate(command: &OperatorCommand) -> Result<(), Rejection> {
     if command.header.as_ref().is_none_or(|header| header.source == 0) {
         return Err(Rejection::NoSource);
     }
-    let poses =
-        [("torso", &command.torso), ("right palm", &command.right_palm), ("left palm", &command.left_palm)];
+    check_poses([
+        ("torso", &command.torso),
+        ("right palm", &command.right_palm),
+        ("left palm", &command.left_palm),
+    ])?;
+    check_openings([("right opening", command.right_opening), ("left opening", command.left_opening)])?;
+    let mode = Mode::try_from(command.mode).map_err(|_| Rejection::Mode(command.mode))?;
+    if command.mode_request_id != 0 && mode == Mode::Unspecified {
+        return Err(Rejection::Mode(command.mode));
+    }
+    Device::try_from(command.device).map_err(|_| Rejection::Device(command.device))?;
+    command.trajectory.as_ref().map_or(Ok(()), validate_trajectory)
+}
+
+/// Accepts a trajectory whose every number can be used and whose times grow, else says why not.
+pub fn validate_trajectory(trajectory: &Trajectory) -> Result<(), Rejection> {
+    let count = trajectory.waypoints.len();
+    if !(1..=MAX_WAYPOINTS).contains(&count) {
+        return Err(Rejection::Waypoints { count });
+    }
+    let mut after_s = 0.0;
+    for (place, waypoint) in trajectory.waypoints.iter().enumerate() {
+        let time_s = waypoint.time_s;
+        // A NaN is after nothing.
+        if !(time_s > after_s && time_s.is_finite()) {
+            return Err(Rejection::Time { number: place + 1, time_s, after_s });
+        }
+        after_s = time_s;
+        let poses = [
+            ("torso of a waypoint", &waypoint.torso),
+            ("right limb of a waypoint", &waypoint.right_limb),
+            ("left limb of a waypoint", &waypoint.left_limb),
+        ];
+        check_poses(poses)?;
+        check_openings([
+            ("right opening of a waypoint", waypoint.right_opening),
+            ("left opening of a waypoint", waypoint.left_opening),
+        ])?;
+    }
+    Ok(())
+}
+
+fn check_poses(poses: [(&'static str, &Option<Pose>); 3]) -> Result<(), Rejection> {
     for (body, pose) in poses {
         if let Some(pose) = pose {
             geometry::isometry(pose).map_err(|source| Rejection::Pose { body, source })?;
         }
     }
-    let openings = [("right opening", command.right_opening), ("left opening", command.left_opening)];
+    Ok(())
+}
+
+fn check_openings(openings: [(&'static str, Option<f64>); 2]) -> Result<(), Rejection> {
     for (gripper, opening) in openings {
         // A NaN is in no range.
         if let Some(value) = opening.filter(|value| !(0.0..=1.0).contains(value)) {
             return Err(Rejection::Opening { gripper, value });
         }
     }
-    let mode = Mode::try_from(command.mode).map_err(|_| Rejection::Mode(command.mode))?;
-    if command.mode_request_id != 0 && mode == Mode::Unspecified {
-        return Err(Rejection::Mode(command.mode));
-    }
-    Device::try_from(command.device).map_err(|_| Rejection::Device(command.device))?;
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{Header, Pose};
+    use crate::messages::{Header, Waypoint};
     use nalgebra::Isometry3;
     use proptest::prelude::*;
 
@@ -94,7 +152,14 @@ mod tests {
             left_opening: None,
             mode_request_id: 1,
             mode: Mode::Stance.into(),
+            trajectory: Some(through([1.0, 2.5])),
         }
+    }
+
+    fn through(times_s: impl IntoIterator<Item = f64>) -> Trajectory {
+        let still = Some(Pose::from(&Isometry3::identity()));
+        let waypoint = |time_s| Waypoint { time_s, torso: still, right_limb: still, ..Waypoint::default() };
+        Trajectory { waypoints: times_s.into_iter().map(waypoint).collect() }
     }
 
     #[test]
@@ -132,6 +197,41 @@ mod tests {
         assert_eq!(validate(&OperatorCommand { mode: 0, ..good() }), Err(Rejection::Mode(0)));
         assert!(validate(&OperatorCommand { mode: 0, mode_request_id: 0, ..good() }).is_ok());
         assert_eq!(validate(&OperatorCommand { device: -1, ..good() }), Err(Rejection::Device(-1)));
+    }
+
+    #[test]
+    fn trajectories_whose_times_do_not_grow_or_whose_numbers_are_none_are_refused() {
+        let judge = |trajectory| validate(&OperatorCommand { trajectory: Some(trajectory), ..good() });
+        let many = |count: u32| through((1..=count).map(f64::from));
+        assert_eq!(judge(many(32)), Ok(()));
+        assert_eq!(judge(many(33)), Err(Rejection::Waypoints { count: 33 }));
+        assert_eq!(judge(many(0)), Err(Rejection::Waypoints { count: 0 }));
+        let refused = Rejection::Time { number: 2, time_s: 1.0, after_s: 1.0 };
+        assert_eq!(judge(through([1.0, 1.0])), Err(refused));
+        for time_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(judge(through([time_s])), Err(Rejection::Time { number: 1, .. })), "{time_s}");
+        }
+        let mut broken = many(2);
+        broken.waypoints[1].left_limb = Some(Pose { position_m: None, ..good().torso.unwrap() });
+        assert!(matches!(judge(broken), Err(Rejection::Pose { body: "left limb of a waypoint", .. })));
+        let mut broken = many(2);
+        broken.waypoints[0].left_opening = Some(1.5);
+        assert!(matches!(judge(broken), Err(Rejection::Opening { .. })));
+    }
+
+    #[test]
+    fn the_longest_trajectory_fits_into_a_command() {
+        let turned = Some(Pose::from(&Isometry3::new([0.1, 0.2, 0.3].into(), [0.4, 0.5, 0.6].into())));
+        let waypoint = |number: u32| Waypoint {
+            time_s: f64::from(number),
+            torso: turned,
+            right_limb: turned,
+            left_limb: turned,
+            right_opening: Some(0.3),
+            left_opening: Some(0.3),
+        };
+        let trajectory = Some(Trajectory { waypoints: (1..=32).map(waypoint).collect() });
+        assert_eq!(validate(&OperatorCommand { trajectory, ..good() }), Ok(()));
     }
 
     proptest! {

@@ -3,7 +3,7 @@
 use locoman_protocol::messages::foxglove::{CameraCalibration, CompressedImage, FrameTransforms};
 use locoman_protocol::messages::{
     Detections, Event, Header, OperatorCommand, Pose, Quaternion, RobotState, ShellPose, SimTruth, Stop,
-    Timing, Tracking, Vector3,
+    Timing, Tracking, Trajectory, Vector3, Waypoint,
 };
 use locoman_protocol::{Topic, Wire, validate};
 use proptest::prelude::*;
@@ -49,6 +49,17 @@ prop_compose! {
 }
 
 prop_compose! {
+    fn waypoints()(
+        time_s in any::<f64>(),
+        bodies in prop::array::uniform3(prop::option::of(poses())),
+        right_opening in prop::option::of(any::<f64>()),
+    ) -> Waypoint {
+        let [torso, right_limb, left_limb] = bodies;
+        Waypoint { time_s, torso, right_limb, left_limb, right_opening, left_opening: None }
+    }
+}
+
+prop_compose! {
     fn commands()(
         header in prop::option::of(headers()),
         engagement: u64,
@@ -57,12 +68,13 @@ prop_compose! {
         openings in prop::array::uniform2(prop::option::of(any::<f64>())),
         mode_request_id: u64,
         mode: i32,
+        waypoints in prop::option::of(prop::collection::vec(waypoints(), 0..4)),
     ) -> OperatorCommand {
         let [torso, right_palm, left_palm] = bodies;
         let [right_opening, left_opening] = openings;
         OperatorCommand {
             header, engagement, device, torso, right_palm, left_palm, right_opening, left_opening,
-            mode_request_id, mode,
+            mode_request_id, mode, trajectory: waypoints.map(|waypoints| Trajectory { waypoints }),
         }
     }
 }

@@ -89,8 +89,11 @@ fn send(
                 }
                 sent.push_back((header.sequence, header.send_ns));
             }
-            *lock(&board.pilot) =
-                PilotStatus { command, waiting_for: pilot.waiting_for(), auto: pilot.auto_enabled() };
+            *lock(&board.pilot) = PilotStatus {
+                command: command.clone(),
+                waiting_for: pilot.waiting_for(),
+                auto: pilot.auto_enabled(),
+            };
             tap.offer(Item::Command(Box::new(command)));
         }
         Err(error) => tracing::warn!("command not sent: {error}"),

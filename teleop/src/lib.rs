@@ -26,6 +26,7 @@ pub mod map;
 pub mod motion;
 pub mod observe;
 pub mod pilot;
+pub mod play;
 pub mod poses;
 pub mod record;
 pub mod recorder;

@@ -11,7 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use locoman_protocol::Endpoints;
 use locoman_protocol::messages::Mode;
 use locoman_teleop::run::{Operator, Options};
-use locoman_teleop::{doctor, poses, record, run, sources};
+use locoman_teleop::{doctor, play, poses, record, run, sources};
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
 use locoman_vision::track::{Tracker, TrackerSettings};
@@ -35,6 +35,8 @@ struct Cli {
 enum Task {
     /// Drives the robot, live or from a recording, and serves the console
     Run(RunArgs),
+    /// Plays a trajectory on the robot, and says how well it was followed
+    Play(PlayArgs),
     /// Tracks a recording offline into a table of poses; deterministic
     Track(TrackArgs),
     /// Records the cameras of the rig
@@ -135,6 +137,22 @@ impl From<AutoMode> for Mode {
 }
 
 #[derive(Debug, Args)]
+struct PlayArgs {
+    /// The trajectory, such as configs/trajectories/square.toml
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Name of the robot
+    #[arg(long, default_value = "locoman", value_name = "NAME")]
+    robot: String,
+    /// Where the robot listens
+    #[arg(long, value_name = "tcp/HOST:PORT", default_values = ["tcp/127.0.0.1:7447"])]
+    connect: Vec<String>,
+    /// Let go after this time, wherever the robot is then
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+#[derive(Debug, Args)]
 struct TrackArgs {
     /// An MCAP file or a folder of images
     #[arg(value_name = "REC")]
@@ -224,19 +242,38 @@ fn obey(cli: Cli) -> Result<()> {
             );
             Ok(())
         }
+        Task::Play(args) => perform(args),
         Task::Record(args) => {
             let path = args.files.rig(&configs);
             let rig = Rig::load(&path)?;
             let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-            let stop = Arc::new(AtomicBool::new(false));
-            let on_signal = Arc::clone(&stop);
-            ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed))?;
+            let stop = stop_on_signal()?;
             let frames = record::run(&rig, &text, &args.output, args.seconds, &stop)?;
             tracing::info!("{frames} frames in {}", args.output.display());
             Ok(())
         }
         Task::Doctor(args) => examine(&configs, &args),
     }
+}
+
+/// Set when the user interrupts the program.
+fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let on_signal = Arc::clone(&stop);
+    ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed))?;
+    Ok(stop)
+}
+
+fn perform(args: PlayArgs) -> Result<()> {
+    let options = play::Options {
+        file: args.file,
+        robot: args.robot,
+        endpoints: Endpoints { listen: Vec::new(), connect: args.connect },
+        seconds: args.seconds,
+    };
+    let interrupted = stop_on_signal()?;
+    println!("{}", play::run(&options, &interrupted)?);
+    Ok(())
 }
 
 fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {

@@ -351,6 +351,7 @@ const fn name(device: Device) -> &'static str {
         Device::Tracker => "tracker",
         Device::Joystick => "joystick",
         Device::Browser => "browser",
+        Device::Trajectory => "trajectory",
     }
 }
 

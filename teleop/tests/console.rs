@@ -44,7 +44,7 @@ impl FakeRobot {
         std::thread::spawn(move || {
             loop {
                 if talking.load(Ordering::Relaxed) {
-                    let command = *last_for_state.lock().unwrap();
+                    let command = last_for_state.lock().unwrap().clone();
                     let mode = if command.mode_request_id == 0 { Mode::Stance } else { command.mode() };
                     let state = RobotState {
                         mode: mode.into(),
@@ -65,7 +65,7 @@ impl FakeRobot {
     }
 
     fn command(&self) -> OperatorCommand {
-        *self.last.lock().unwrap()
+        self.last.lock().unwrap().clone()
     }
 }
 

@@ -113,3 +113,16 @@ fn a_mujoco_library_that_cannot_be_brought_leaves_instructions() {
     let error = error_of(&output);
     assert!(error.contains("pip download") && error.contains("libmujoco"), "{error}");
 }
+
+#[test]
+fn a_trajectory_with_a_wrong_time_is_named_with_its_line_and_what_to_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(root().join("configs/trajectories/square.toml")).unwrap();
+    let line = 1 + text.lines().position(|line| line == "time_s = 4.0").unwrap();
+    let text = text.replacen("time_s = 4.0", "time_s = 1.0", 1);
+    let file = write(folder.path(), "wrong.toml", text.as_bytes()).unwrap();
+    let output = finish("locoman-teleop", &["play", &file]).unwrap();
+    let error = error_of(&output);
+    let expected = format!("line {line}: time_s = 1; write a time after 2 s");
+    assert!(error.contains("wrong.toml") && error.contains(&expected), "{error}");
+}

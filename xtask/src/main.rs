@@ -38,11 +38,14 @@ enum Command {
 
 #[derive(clap::Args)]
 struct EvalArgs {
-    /// Which one: `vision`; `demo` judges the recording of the last headless demo.
+    /// Which one: `vision`, `tracking`; `demo` judges the recording of the last headless demo.
     name: String,
     /// Another seed than the published one.
     #[arg(long)]
     seed: Option<u64>,
+    /// What else the experiment takes, after `--`: see `locoman-sim eval NAME --help`.
+    #[arg(last = true, value_name = "ARGS")]
+    more: Vec<String>,
 }
 
 fn main() -> ExitCode {
@@ -84,6 +87,7 @@ fn eval(args: &EvalArgs) -> Result<()> {
     if args.name == "demo" {
         command.arg("--recording").arg(demo::session_recording());
     }
+    command.args(&args.more);
     shell::run(&mut command)
 }
 

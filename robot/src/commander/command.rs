@@ -69,7 +69,7 @@ impl Command {
             opening: [message.right_opening, message.left_opening],
             mode_request: message.mode_request_id,
             mode: Mode::from_message(message.mode()),
-            trajectory: None,
+            trajectory: message.trajectory.as_ref().and_then(Trajectory::from_message),
         }
     }
 

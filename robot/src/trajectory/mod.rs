@@ -12,5 +12,5 @@ mod path;
 mod player;
 
 pub use bezier::Segment;
-pub use path::{MAX_WAYPOINTS, Sample, Trajectory, Waypoint};
+pub use path::{Sample, Trajectory, Waypoint};
 pub use player::Player;

@@ -1,12 +1,14 @@
 //! A trajectory: up to 32 poses of torso and limbs, each with the time at which to be there.
 
+use locoman_protocol::{
+    geometry::isometry,
+    messages::{self, Pose},
+    validate::MAX_WAYPOINTS,
+};
 use nalgebra::Isometry3;
 
 use super::bezier::Segment;
 use crate::commander::PoseReference;
-
-/// The most poses of a trajectory: a command stays of fixed size.
-pub const MAX_WAYPOINTS: usize = 32;
 
 /// Where the bodies are to be at some time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +41,8 @@ pub struct Sample {
     pub opening: [Option<f64>; 2],
 }
 
-/// Poses to go through, at rest in each; before the first, nothing is displaced.
+/// Poses to go through, at rest in each; before the first, nothing is displaced. Of fixed size: it is part of
+/// a command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trajectory {
     waypoints: [Waypoint; MAX_WAYPOINTS],
@@ -61,6 +64,27 @@ impl Trajectory {
             sut.count += 1;
         }
         (sut.count > 0).then_some(sut)
+    }
+
+    /// From a message; a body that a waypoint leaves out stays where the one before has it. None if the message
+    /// is not one that [`locoman_protocol::validate::validate_trajectory`] accepts.
+    pub fn from_message(message: &messages::Trajectory) -> Option<Self> {
+        let mut last = Waypoint::still(0.0);
+        let there = |pose: &Option<Pose>, before: Isometry3<f64>| {
+            pose.as_ref().and_then(|pose| isometry(pose).ok()).unwrap_or(before)
+        };
+        Self::new(message.waypoints.iter().map(|waypoint| {
+            last = Waypoint {
+                time_s: waypoint.time_s,
+                torso: there(&waypoint.torso, last.torso),
+                limbs: [
+                    there(&waypoint.right_limb, last.limbs[0]),
+                    there(&waypoint.left_limb, last.limbs[1]),
+                ],
+                opening: [waypoint.right_opening, waypoint.left_opening],
+            };
+            last
+        }))
     }
 
     /// The poses.

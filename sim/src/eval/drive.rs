@@ -102,7 +102,7 @@ impl Drive {
         let seconds = |drive: &Self| (drive.time_ns() - begin_ns) as f64 * 1e-9;
         while seconds(self) < script.seconds {
             let motion = (script.motion)(seconds(self));
-            self.exchange(&OperatorCommand { engagement: request, ..asking.with(&motion) })?;
+            self.exchange(&OperatorCommand { engagement: request, ..asking.clone().with(&motion) })?;
         }
         for _ in 0..40 {
             self.exchange(&asking)?;
@@ -141,7 +141,7 @@ impl Drive {
             self.sequence += 1;
             let header =
                 Header { source: SOURCE, sequence: self.sequence, capture_ns: now_ns, send_ns: now_ns };
-            let message = OperatorCommand { header: Some(header), ..*wish };
+            let message = OperatorCommand { header: Some(header), ..wish.clone() };
             self.latest = Some(Command::from_message(&message, now_ns));
             self.session.commands.push(message);
         }

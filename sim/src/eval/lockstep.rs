@@ -27,6 +27,7 @@ pub struct Lockstep {
     operator: Command,
     truth: Truth,
     ticks: u64,
+    silent: bool,
 }
 
 impl Lockstep {
@@ -53,13 +54,13 @@ impl Lockstep {
             trajectory: None,
         };
         let (command, truth) = (*controller.command(), plant.truth());
-        Ok(Self { plant, controller, command, operator, truth, ticks: 0 })
+        Ok(Self { plant, controller, command, operator, truth, ticks: 0, silent: false })
     }
 
     /// One control step.
     pub fn tick(&mut self) -> anyhow::Result<()> {
         let sensors = self.plant.exchange(&self.command)?;
-        if self.ticks.is_multiple_of(COMMAND_EVERY) {
+        if !self.silent && self.ticks.is_multiple_of(COMMAND_EVERY) {
             self.operator.sequence += 1;
             self.operator.capture_ns = sensors.time_ns;
             self.operator.received_ns = sensors.time_ns;
@@ -115,6 +116,11 @@ impl Lockstep {
             self.snapshot().assessment
         );
         Ok(())
+    }
+
+    /// The operator's commands come, or no longer do.
+    pub fn set_silent(&mut self, silent: bool) {
+        self.silent = silent;
     }
 
     /// The operator lets go.

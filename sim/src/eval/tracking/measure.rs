@@ -86,7 +86,10 @@ pub fn measure(
         for (place, body) in bodies.iter().enumerate() {
             let (Some(body), Some(anchor)) = (body, &anchors[place]) else { continue };
             let desired = displacements[place].displacing(anchor).pose();
-            let true_pose = sim_from_world.inv_mul(&body.truth(sut.truth()));
+            let mut true_pose = sim_from_world.inv_mul(&body.truth(sut.truth()));
+            if let Body::Foot(_) = body {
+                true_pose = point(true_pose.translation.vector);
+            }
             let errors = &mut errors[place];
             errors.reference.push(&desired, &body.reference(&sut));
             errors.estimate.push(&desired, &body.estimate(sut.controller().wbc().dynamics()));
@@ -123,6 +126,9 @@ impl Body {
         let frame = match self {
             Self::Torso => Frame::Torso,
             Self::Gripper(side) => Frame::Gripper(side),
+            Self::Foot(side) => {
+                return point(dynamics.frame(Frame::Foot(side.leg())).world_from_frame.translation.vector);
+            }
         };
         dynamics.frame(frame).world_from_frame
     }
@@ -131,6 +137,7 @@ impl Body {
         match self {
             Self::Torso => truth.world_from_torso,
             Self::Gripper(side) => truth.world_from_gripper[side.index()],
+            Self::Foot(side) => point(truth.feet_in_world[side.leg().index()].coords),
         }
     }
 
@@ -138,8 +145,14 @@ impl Body {
         match self {
             Self::Torso => sut.snapshot().torso.target,
             Self::Gripper(side) => sut.snapshot().grippers[side.index()].target,
+            Self::Foot(side) => sut.snapshot().feet[side.index()].target,
         }
     }
+}
+
+/// A body without orientation.
+fn point(position: Vector3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(position.into(), UnitQuaternion::identity())
 }
 
 impl Series {

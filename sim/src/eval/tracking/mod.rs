@@ -2,7 +2,7 @@
 //!
 //! Each task is played for every seed in two profiles: `hw`, with all of the simulator's imperfections, and
 //! `ideal`, without. Four intermediate poses in 8 s, 3200 targets at 400 Hz; the poses are uniform on each axis
-//! within ±50 mm and ±0.25 rad (gripper), ±15 mm and ±0.08 rad (torso), ±40 mm and ±0.2 rad (torso on four feet):
+//! within ±50 mm and ±0.25 rad (gripper), ±50 mm (foot), ±15 mm and ±0.08 rad (torso), ±40 mm and ±0.2 rad (torso on four feet):
 //! the paper does not give its own, these are those with which its authors' controller was measured in MuJoCo.
 //! Odd seeds use the right limb, even seeds the left.
 
@@ -14,8 +14,8 @@ mod task;
 use std::path::Path;
 
 use anyhow::Context;
-use locoman_robot::trajectory::{Trajectory, Waypoint};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use locoman_protocol::trajectory::TrajectoryFile;
+use locoman_robot::trajectory::Trajectory;
 use rayon::prelude::*;
 
 use super::Report;
@@ -43,7 +43,7 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
         [] => vec!["hw", "ideal"],
         some => some.iter().map(String::as_str).collect(),
     };
-    let square = square().context("the square is no trajectory")?;
+    let square = square(configs)?;
     let mut plays = Vec::new();
     for profile in profiles {
         for &task in &tasks {
@@ -63,22 +63,9 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
     Ok(table::report(&runs, seed))
 }
 
-/// The rectangle.
-fn square() -> Option<Trajectory> {
-    let corner = |time_s: f64, x: f64, y: f64, z: f64, lean: f64| {
-        let mut waypoint = Waypoint::still(time_s);
-        waypoint.limbs[0] = Isometry3::translation(x, y, z);
-        waypoint.torso = Isometry3::from_parts(
-            (0.01 * lean * Vector3::x()).into(),
-            UnitQuaternion::from_scaled_axis(Vector3::new(0.0, -0.1, -0.06) * lean),
-        );
-        waypoint
-    };
-    Trajectory::new([
-        corner(2.0, -0.1, 0.02, 0.02, 0.0),
-        corner(4.0, -0.1, 0.02, 0.27, 0.5),
-        corner(6.0, 0.15, -0.08, 0.27, 1.0),
-        corner(8.0, 0.15, -0.08, 0.02, 1.0),
-        corner(10.0, -0.1, 0.02, 0.02, 0.0),
-    ])
+/// The square as it is shipped.
+fn square(configs: &Path) -> anyhow::Result<Trajectory> {
+    let path = configs.join("trajectories/square.toml");
+    let file = TrajectoryFile::read(&path)?;
+    Trajectory::from_message(&file.trajectory).with_context(|| format!("{}: no trajectory", path.display()))
 }

@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use anyhow::Context;
+use locoman_robot::joints::Side;
 use nalgebra::Vector3;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::measure::{BodyErrors, Run};
-use super::task::Task;
+use super::task::{Body, Task};
 use crate::robot::EXCHANGE_S;
 
-const SIZE_PX: (u32, u32) = (1200, 1000);
+const SIZE_PX: (u32, u32) = (1200, 1260);
 const ESTIMATE: RGBColor = RGBColor(0, 114, 178);
 const TRUTH: RGBColor = RGBColor(230, 120, 0);
 const DESIRED: RGBColor = RGBColor(0, 0, 0);
@@ -38,7 +39,8 @@ pub fn draw(path: &Path, runs: &[Run]) -> anyhow::Result<()> {
         let torso: Vec<&BodyErrors> = of_task.iter().map(|run| &run.torso).collect();
         let limb: Vec<&BodyErrors> = of_task.iter().filter_map(|run| run.limb.as_ref()).collect();
         errors(&panels[2 * row], &format!("{} ({profile}): torso, mm", task.name()), &torso)?;
-        errors(&panels[2 * row + 1], &format!("{} ({profile}): gripper, mm", task.name()), &limb)?;
+        let name = task.limb(Side::Right).map_or("", Body::name);
+        errors(&panels[2 * row + 1], &format!("{} ({profile}): {name}, mm", task.name()), &limb)?;
     }
     if let Some(limb) = square.and_then(|run| run.limb.as_ref()) {
         path_seen(&panels[2 * tasks.len()], "square from the side: x, z in mm", limb, |p| (p.x, p.z))?;
@@ -60,7 +62,7 @@ fn errors(area: &Area<'_>, caption: &str, runs: &[&BodyErrors]) -> anyhow::Resul
         .margin(6)
         .x_label_area_size(22)
         .y_label_area_size(40)
-        .build_cartesian_2d(0.0..count as f64 * EXCHANGE_S, 0.0..1.05 * top)?;
+        .build_cartesian_2d(0.0..count as f64 * EXCHANGE_S, 0.0..1.3 * top)?;
     chart.configure_mesh().light_line_style(WHITE).y_labels(5).draw()?;
     for (name, colour, of) in [("truth", TRUTH, true), ("estimator", ESTIMATE, false)] {
         for (i, run) in runs.iter().enumerate() {
@@ -76,7 +78,7 @@ fn errors(area: &Area<'_>, caption: &str, runs: &[&BodyErrors]) -> anyhow::Resul
             }
         }
     }
-    legend(&mut chart)
+    legend(&mut chart, SeriesLabelPosition::UpperRight)
 }
 
 /// Where the limb should have been, and was, seen along an axis.
@@ -110,17 +112,16 @@ fn path_seen(
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
     }
-    legend(&mut chart)
+    legend(&mut chart, SeriesLabelPosition::MiddleMiddle)
 }
 
-fn legend<'a, 'b: 'a, C>(chart: &mut ChartContext<'a, SVGBackend<'b>, C>) -> anyhow::Result<()>
+fn legend<'a, 'b: 'a, C>(
+    chart: &mut ChartContext<'a, SVGBackend<'b>, C>,
+    position: SeriesLabelPosition,
+) -> anyhow::Result<()>
 where
     C: CoordTranslate,
 {
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .draw()?;
+    chart.configure_series_labels().position(position).background_style(WHITE.mix(0.8)).draw()?;
     Ok(())
 }

@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
+use locoman_robot::joints::Side;
+
 use super::measure::{BodyErrors, Run, Series};
-use super::task::{Bounds, PoseBounds, Task};
+use super::task::{Body, Bounds, PoseBounds, Task};
 use crate::eval::statistics::mean;
 use crate::eval::{Figure, Must, Report};
 
@@ -23,7 +25,8 @@ pub fn report(runs: &[Run], seed: u64) -> Report {
             }
             if let Some(bounds) = task.limb_bounds() {
                 let errors: Vec<&BodyErrors> = runs.iter().filter_map(|run| run.limb.as_ref()).collect();
-                body(&mut report, &mut table, (profile, task), "gripper", &errors, &bounds);
+                let name = task.limb(Side::Right).map_or("", Body::name);
+                body(&mut report, &mut table, (profile, task), name, &errors, &bounds);
             }
             let errors: Vec<&BodyErrors> = runs.iter().map(|run| &run.torso).collect();
             body(&mut report, &mut table, (profile, task), "torso", &errors, &task.torso_bounds());
@@ -49,7 +52,9 @@ fn body(
     type Of = fn(&Series) -> &Vec<f64>;
     let quantities: [(&'static str, Of); 2] =
         [("mm", |series| &series.position), ("rad", |series| &series.rotation)];
-    for ((unit, of), bounds) in quantities.into_iter().zip(bounds) {
+    // A foot has no orientation.
+    let count = if name == "foot" { 1 } else { 2 };
+    for ((unit, of), bounds) in quantities.into_iter().zip(bounds).take(count) {
         let prefix = if profile == "hw" { String::new() } else { format!("{profile}.") };
         let what = format!("{prefix}{}.{name}_{unit}", task.name());
         let bounds = if profile == "hw" { *bounds } else { ideal(unit) };

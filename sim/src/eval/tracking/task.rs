@@ -19,6 +19,10 @@ pub enum Task {
     GripperTorsoStill,
     /// Gripper and torso move.
     GripperTorsoMoving,
+    /// A front foot moves, the torso holds.
+    FootTorsoStill,
+    /// A front foot and the torso move.
+    FootTorsoMoving,
     /// On four feet, the torso moves.
     StandingTorsoMoving,
     /// The gripper draws a rectangle in space while the torso leans in.
@@ -32,6 +36,19 @@ pub enum Body {
     Torso,
     /// Gripper of a side.
     Gripper(Side),
+    /// Front foot of a side: a point.
+    Foot(Side),
+}
+
+impl Body {
+    /// In figures.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Torso => "torso",
+            Self::Gripper(_) => "gripper",
+            Self::Foot(_) => "foot",
+        }
+    }
 }
 
 /// Largest displacement of a random pose on each axis.
@@ -59,14 +76,22 @@ pub type PoseBounds = [Bounds; 2];
 
 impl Task {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 4] =
-        [Self::GripperTorsoStill, Self::GripperTorsoMoving, Self::StandingTorsoMoving, Self::Square];
+    pub const ALL: [Self; 6] = [
+        Self::GripperTorsoStill,
+        Self::GripperTorsoMoving,
+        Self::FootTorsoStill,
+        Self::FootTorsoMoving,
+        Self::StandingTorsoMoving,
+        Self::Square,
+    ];
 
     /// In figures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::GripperTorsoStill => "gripper_torso_still",
             Self::GripperTorsoMoving => "gripper_torso_moving",
+            Self::FootTorsoStill => "foot_torso_still",
+            Self::FootTorsoMoving => "foot_torso_moving",
             Self::StandingTorsoMoving => "standing_torso_moving",
             Self::Square => "square",
         }
@@ -81,7 +106,8 @@ impl Task {
     pub const fn mode(self, side: Side) -> Mode {
         match self {
             Self::StandingTorsoMoving => Mode::Stance,
-            _ => Mode::Gripper(side),
+            Self::FootTorsoStill | Self::FootTorsoMoving => Mode::Foot(side),
+            Self::GripperTorsoStill | Self::GripperTorsoMoving | Self::Square => Mode::Gripper(side),
         }
     }
 
@@ -89,7 +115,8 @@ impl Task {
     pub const fn limb(self, side: Side) -> Option<Body> {
         match self {
             Self::StandingTorsoMoving => None,
-            _ => Some(Body::Gripper(side)),
+            Self::FootTorsoStill | Self::FootTorsoMoving => Some(Body::Foot(side)),
+            Self::GripperTorsoStill | Self::GripperTorsoMoving | Self::Square => Some(Body::Gripper(side)),
         }
     }
 
@@ -114,11 +141,14 @@ impl Task {
     const fn reach(self) -> (Reach, Reach) {
         const NONE: Reach = Reach { position_m: 0.0, rotation_rad: 0.0 };
         const GRIPPER: Reach = Reach { position_m: 0.05, rotation_rad: 0.25 };
+        const FOOT: Reach = Reach { position_m: 0.05, rotation_rad: 0.0 };
         const TORSO: Reach = Reach { position_m: 0.015, rotation_rad: 0.08 };
         const STANDING: Reach = Reach { position_m: 0.04, rotation_rad: 0.2 };
         match self {
             Self::GripperTorsoStill => (GRIPPER, NONE),
             Self::GripperTorsoMoving => (GRIPPER, TORSO),
+            Self::FootTorsoStill => (FOOT, NONE),
+            Self::FootTorsoMoving => (FOOT, TORSO),
             Self::StandingTorsoMoving => (NONE, STANDING),
             Self::Square => (NONE, NONE),
         }
@@ -135,6 +165,12 @@ impl Task {
                 bounds(Some(0.80), Some(1.5), Some(1.89), Some(4.0)),
                 bounds(Some(0.006), Some(0.010), Some(0.047), None),
             ]),
+            Self::FootTorsoStill => {
+                Some([bounds(Some(0.45), Some(1.5), Some(0.93), Some(3.6)), bounds(None, None, None, None)])
+            }
+            Self::FootTorsoMoving => {
+                Some([bounds(Some(0.55), Some(1.5), Some(1.10), Some(4.0)), bounds(None, None, None, None)])
+            }
             Self::StandingTorsoMoving => None,
             Self::Square => {
                 Some([bounds(Some(0.50), Some(1.5), Some(1.06), None), bounds(None, None, None, None)])
@@ -152,6 +188,14 @@ impl Task {
             Self::GripperTorsoMoving => [
                 bounds(Some(0.60), Some(1.0), Some(2.38), Some(2.5)),
                 bounds(Some(0.003), Some(0.005), Some(0.016), None),
+            ],
+            Self::FootTorsoStill => [
+                bounds(Some(0.60), Some(1.0), Some(2.02), Some(2.1)),
+                bounds(Some(0.002), Some(0.004), Some(0.0078), None),
+            ],
+            Self::FootTorsoMoving => [
+                bounds(Some(0.60), Some(1.0), Some(2.26), Some(2.4)),
+                bounds(Some(0.003), Some(0.005), Some(0.017), None),
             ],
             Self::StandingTorsoMoving => [
                 bounds(Some(0.50), Some(1.0), Some(1.05), Some(2.4)),
