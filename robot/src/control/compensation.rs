@@ -90,18 +90,27 @@ pub struct Compensation {
     friction: JointVector,
     /// Share of the load of each foot in the last step.
     share: [f64; 4],
+    /// Whether offsets grow.
+    learns: bool,
 }
 
 impl Compensation {
     /// Knows nothing yet.
     pub fn new(settings: CompensationSettings) -> Self {
-        Self { settings, offset: JointVector::zeros(), friction: JointVector::zeros(), share: [0.0; 4] }
+        let (offset, friction) = (JointVector::zeros(), JointVector::zeros());
+        Self { settings, offset, friction, share: [0.0; 4], learns: true }
     }
 
     /// Forgets the offsets, which belong to a load and a posture; friction is the joint's own.
     pub fn restart(&mut self) {
         self.offset.fill(0.0);
         self.share = [0.0; 4];
+    }
+
+    /// Whether offsets grow. They must not while a foot seeks the ground: one that touches and does not feel it
+    /// would press harder and harder.
+    pub fn set_learning(&mut self, learns: bool) {
+        self.learns = learns;
     }
 
     /// Learns from the step q̄ - q, and adds to a command for q̄ what was learned.
@@ -120,6 +129,7 @@ impl Compensation {
             let error = step[joint].clamp(-cap, cap) * dt_s;
             let direction = (command.velocity[joint] / self.settings.friction_speed_rad_s).tanh();
 
+            let rate = if self.learns { rate } else { 0.0 };
             let offset = self.offset[joint] + rate * error;
             self.offset[joint] = offset.clamp(-of.max_offset_rad, of.max_offset_rad);
             let friction = self.friction[joint] + of.friction_rate * error * direction;

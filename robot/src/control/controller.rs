@@ -313,6 +313,7 @@ impl Controller {
                 let WbcOutput { position, velocity, torque, .. } = self.output;
                 let (kp, kd) = JointGains::vectors(gains.balance_kp, gains.balance_kd);
                 let mut command = JointCommand { position, velocity, torque, kp, kd, opening };
+                self.compensation.set_learning(!matches!(phase, Phase::LowerFoot(_)));
                 self.compensation.apply(
                     &self.config.model,
                     &(position - state.position),
