@@ -32,14 +32,9 @@ fn build((feet, lever, wanted, least, most): (usize, Vec<f64>, Vec<f64>, f64, f6
         }
     }
     let d: [f64; 6] = std::array::from_fn(|row| wanted[row] * 5.0 + if row == 2 { 9.81 } else { 0.0 });
-    let mut problem = ForceProblem {
-        feet,
-        hessian: [[0.0; MAX_FORCES]; MAX_FORCES],
-        gradient: [0.0; MAX_FORCES],
-        friction: FRICTION,
-        min_vertical: [least; 4],
-        max_vertical: [most; 4],
-    };
+    let mut problem = ForceProblem::new(FRICTION);
+    problem.feet = feet;
+    (problem.min_vertical, problem.max_vertical) = ([least; 4], [most; 4]);
     for row in 0..3 * feet {
         for column in 0..3 * feet {
             problem.hessian[row][column] =

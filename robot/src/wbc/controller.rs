@@ -2,7 +2,8 @@
 
 use super::{
     ContactSet, Objective, WbcFault, WbcOutput, WbcSettings, WbcStatus,
-    ground::{ForceDistribution, GroundReaction, ground_load},
+    force::ForceProblem,
+    ground::{ForceDistribution, GroundReaction},
     objective::Robot,
     stops::{MOST_IN_A_LIMB, Stops, Surroundings},
     task::Task,
@@ -13,6 +14,17 @@ use crate::{
     joints::JOINTS,
     model::Model,
 };
+
+/// Parts of a control step, in order. What follows, assembling the command, is not worth a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepPart {
+    /// Kinematics and dynamics.
+    Dynamics,
+    /// q̄, dq̄ and ddq̄.
+    Hierarchy,
+    /// Contact forces and torques.
+    Forces,
+}
 
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
@@ -47,6 +59,18 @@ impl WholeBodyController {
         &self.dynamics
     }
 
+    /// The contact-force problem of the last step.
+    pub const fn force_problem(&self) -> &ForceProblem {
+        self.forces.problem()
+    }
+
+    /// Leaves the contact forces of every step to the interior-point method, for measurements.
+    #[must_use]
+    pub const fn with_interior_point_only(mut self) -> Self {
+        self.forces.use_second_only();
+        self
+    }
+
     /// One control step. `objectives` stand in order, most important first. Allocates nothing (unless the
     /// interior-point method has to step in).
     ///
@@ -61,6 +85,19 @@ impl WholeBodyController {
         contacts: &ContactSet,
         output: &mut WbcOutput,
     ) {
+        self.step_watched(model, state, objectives, contacts, output, |_| {});
+    }
+
+    /// The same, telling when each part is done: for measurements.
+    pub fn step_watched(
+        &mut self,
+        model: &Model,
+        state: &State,
+        objectives: &[Objective],
+        contacts: &ContactSet,
+        output: &mut WbcOutput,
+        mut done: impl FnMut(StepPart),
+    ) {
         let mut status = WbcStatus { force_failures: self.failures, ..WbcStatus::default() };
         if !state.is_finite() {
             status.fault = Some(WbcFault::State);
@@ -68,8 +105,11 @@ impl WholeBodyController {
             return;
         }
         self.dynamics.update(model, state);
+        done(StepPart::Dynamics);
         let acceleration = self.track(model, state, objectives, contacts, &mut status);
+        done(StepPart::Hierarchy);
         let reaction = self.forces.solve(model, &self.dynamics, contacts, &acceleration);
+        done(StepPart::Forces);
         let Some(reaction) = reaction else {
             status.fault = Some(WbcFault::Output);
             output.status = status;
@@ -77,7 +117,7 @@ impl WholeBodyController {
         };
         self.count_failures(&reaction, &mut status);
 
-        let mut command = self.command(state, &acceleration, &reaction);
+        let mut command = self.command(state, &reaction);
         command.status = status;
         command.limit(model);
         if command.is_finite() {
@@ -101,14 +141,13 @@ impl WholeBodyController {
     ) -> Motion {
         self.tracking.begin(self.dynamics.mass_matrix());
         for leg in contacts.legs() {
-            self.tracking.add(&Task::contact(&self.dynamics, leg), 0.0);
+            self.tracking.add(Task::contact(&self.dynamics, leg), 0.0);
         }
-        let contacts_only = self.tracking.acceleration();
         let start = self.tracking.mark();
 
         let mut stops = Stops::default();
         for _ in 0..=MOST_IN_A_LIMB {
-            self.tracking.rewind(&start);
+            self.tracking.rewind(start);
             self.track_with(state, objectives, &stops, status);
             let around = Surroundings {
                 model,
@@ -124,18 +163,19 @@ impl WholeBodyController {
         }
         status.limited = stops.joints();
         status.grounded = stops.frames();
-        self.bounded(&contacts_only, &self.tracking.acceleration(), status)
+        let [contacts_only, wanted] = self.tracking.accelerations(start);
+        self.bounded(&contacts_only, &wanted, status)
     }
 
     /// Stops, then objectives.
     fn track_with(&mut self, state: &State, objectives: &[Objective], stops: &Stops, status: &mut WbcStatus) {
         let gains = &self.settings.objectives;
         let robot = Robot { state, dynamics: &self.dynamics };
-        stops.for_each_task(state, &self.dynamics, &gains.arm_posture, |task| self.tracking.add(&task, 0.0));
+        stops.for_each_task(state, &self.dynamics, &gains.arm_posture, |task| self.tracking.add(task, 0.0));
         for objective in objectives {
             let gains = gains.of(objective.kind());
             match objective.task(&robot, gains) {
-                Some(task) => self.tracking.add(&task, gains.damping_start),
+                Some(task) => self.tracking.add(task, gains.damping_start),
                 None => status.fault = Some(WbcFault::Reference),
             }
         }
@@ -160,6 +200,7 @@ impl WholeBodyController {
 
     fn count_failures(&mut self, reaction: &GroundReaction, status: &mut WbcStatus) {
         status.forces = reaction.source;
+        status.torques_relaxed = reaction.torques_relaxed;
         match reaction.source.failure() {
             None => self.failures_in_a_row = 0,
             Some(failure) => {
@@ -173,20 +214,14 @@ impl WholeBodyController {
         status.force_failures = self.failures;
     }
 
-    /// τ = A q̈_cmd + b + g - J_cᵀ f_r with q̈_cmd = ddq̄ + (δ_t, 0); and q̄, dq̄ of the joints.
-    fn command(&self, state: &State, acceleration: &Motion, reaction: &GroundReaction) -> WbcOutput {
-        let mut commanded = *acceleration;
-        for axis in 0..6 {
-            commanded[axis] += reaction.slack[axis];
-        }
-        let effort =
-            self.dynamics.inverse_dynamics(&commanded) - ground_load(&self.dynamics, &reaction.force);
+    /// q̄, dq̄ and τ = A q̈_cmd + b + g - J_cᵀ f_r of the joints, with q̈_cmd = ddq̄ + (δ_t, 0).
+    fn command(&self, state: &State, reaction: &GroundReaction) -> WbcOutput {
         let mut output = WbcOutput::hold(state.position);
         let (step, velocity) = (self.tracking.position_step(), self.tracking.velocity());
         for joint in 0..JOINTS {
             output.position[joint] += step[6 + joint];
             output.velocity[joint] = velocity[6 + joint];
-            output.torque[joint] = effort[6 + joint];
+            output.torque[joint] = reaction.effort[6 + joint];
         }
         output.foot_force = reaction.force;
         output.torso_slack = reaction.slack;

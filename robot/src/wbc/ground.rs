@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
 use super::{
     ContactForceSettings, ContactSet, ForceFailure, ForceSource,
-    force::{ActiveSet, ForceProblem, ForceSolver, Forces, InteriorPoint, MAX_FORCES},
+    force::{ActiveSet, ForceProblem, ForceSolver, Forces, InteriorPoint, MAX_FORCES, TorqueLimits},
 };
 use crate::{
     dynamics::{Dynamics, Motion},
@@ -19,14 +19,21 @@ pub(super) struct GroundReaction {
     pub(super) force: [Vector3<f64>; 4],
     /// δ_t, in the torso's frame.
     pub(super) slack: Vector6<f64>,
+    /// A (q̈ + (δ_t, 0)) + b + g - J_cᵀ f_r: what torso and joints have to give. N, N m.
+    pub(super) effort: Motion,
     pub(super) source: ForceSource,
+    /// No forces keep the torques within limits: the limits were left out.
+    pub(super) torques_relaxed: bool,
 }
 
 /// The quadratic program of a step, its two solvers, and the last forces that were feasible.
 pub(super) struct ForceDistribution {
     settings: ContactForceSettings,
+    problem: ForceProblem,
     first: ActiveSet,
     second: InteriorPoint,
+    /// For measurements: the second solver in every step.
+    second_only: bool,
     last: [Vector3<f64>; 4],
 }
 
@@ -40,13 +47,25 @@ impl ForceDistribution {
     pub(super) fn new(settings: ContactForceSettings) -> Self {
         Self {
             settings,
+            problem: ForceProblem::new(settings.friction),
             first: ActiveSet::default(),
             second: InteriorPoint::new(settings.friction),
+            second_only: false,
             last: [Vector3::zeros(); 4],
         }
     }
 
-    /// Forces for an acceleration q̈, and the slack that they leave.
+    /// Leaves every step to the interior-point method, for measurements.
+    pub(super) const fn use_second_only(&mut self) {
+        self.second_only = true;
+    }
+
+    /// The problem of the last step.
+    pub(super) const fn problem(&self) -> &ForceProblem {
+        &self.problem
+    }
+
+    /// Forces for an acceleration q̈, the slack that they leave, and what they leave to the joints.
     pub(super) fn solve(
         &mut self,
         model: &Model,
@@ -55,63 +74,125 @@ impl ForceDistribution {
         acceleration: &Motion,
     ) -> Option<GroundReaction> {
         let weight = model.mass() * GRAVITY;
-        let balance = TorsoBalance::new(dynamics, contacts, acceleration, weight)?;
-        let problem = self.problem(contacts, &balance);
+        let unaided = dynamics.inverse_dynamics(acceleration);
+        let balance = TorsoBalance::new(dynamics, contacts, &unaided, weight)?;
+        self.set_feet(contacts);
+        self.set_cost(&balance);
+        self.set_torque_limits(model, dynamics, contacts, &balance, &unaided, weight);
+
         let mut forces: Forces = [0.0; MAX_FORCES];
-        let source = if problem.feet == 0 {
-            ForceSource::NoContact
-        } else if self.first.solve(&problem, &mut forces).is_ok() {
-            ForceSource::ActiveSet
-        } else {
-            match self.second.solve(&problem, &mut forces) {
-                Ok(()) => ForceSource::InteriorPoint,
-                Err(failure) => {
-                    self.recall(contacts, &problem, weight, &mut forces);
-                    ForceSource::LastFeasible(failure)
-                }
-            }
-        };
+        let (source, torques_relaxed) = self.find(contacts, weight, &mut forces);
         let slack = (balance.from_forces * SMatrix::from(forces) - balance.wanted) * weight;
         let mut force = [Vector3::zeros(); 4];
         for (slot, leg) in contacts.legs().enumerate() {
             force[leg.index()] = Vector3::from_column_slice(&forces[3 * slot..3 * slot + 3]) * weight;
         }
         self.last = force;
-        Some(GroundReaction { force, slack, source })
+        let effort =
+            unaided + dynamics.mass_matrix().fixed_columns::<6>(0) * slack - ground_load(dynamics, &force);
+        Some(GroundReaction { force, slack, effort, source, torques_relaxed })
     }
 
-    /// H = Q_1 + Bᵀ Q_2 B and h = -Bᵀ Q_2 d.
-    fn problem(&self, contacts: &ContactSet, balance: &TorsoBalance) -> ForceProblem {
-        let mut weighted = balance.from_forces;
-        for (row, weight) in self.settings.slack_weight.iter().enumerate() {
-            weighted.row_mut(row).scale_mut(*weight);
+    /// Solves the problem: with the torque limits, else without.
+    fn find(&mut self, contacts: &ContactSet, weight: f64, forces: &mut Forces) -> (ForceSource, bool) {
+        if self.problem.feet == 0 {
+            return (ForceSource::NoContact, false);
         }
-        let mut problem = ForceProblem {
-            feet: 0,
-            hessian: [[0.0; MAX_FORCES]; MAX_FORCES],
-            gradient: [0.0; MAX_FORCES],
-            friction: self.settings.friction,
-            min_vertical: [0.0; 4],
-            max_vertical: [0.0; 4],
+        let mut failure = match self.try_both(forces) {
+            Ok(source) => return (source, false),
+            Err(failure) => failure,
         };
+        // Only the torque limits can leave no forces.
+        if failure == ForceFailure::Infeasible {
+            let limits = std::mem::replace(&mut self.problem.torque.joints, 0);
+            let found = self.try_both(forces);
+            self.problem.torque.joints = limits;
+            match found {
+                Ok(source) => return (source, true),
+                Err(still) => failure = still,
+            }
+        }
+        self.recall(contacts, weight, forces);
+        (ForceSource::LastFeasible(failure), false)
+    }
+
+    fn try_both(&mut self, forces: &mut Forces) -> Result<ForceSource, ForceFailure> {
+        if !self.second_only {
+            match self.first.solve(&self.problem, forces) {
+                Ok(()) => return Ok(ForceSource::ActiveSet),
+                // It has a proof: a constraint that contradicts the active ones.
+                Err(ForceFailure::Infeasible) if self.problem.torque.joints > 0 => {
+                    return Err(ForceFailure::Infeasible);
+                }
+                Err(_) => {}
+            }
+        }
+        self.second.solve(&self.problem, forces).map(|()| ForceSource::InteriorPoint)
+    }
+
+    fn set_feet(&mut self, contacts: &ContactSet) {
+        let problem = &mut self.problem;
+        problem.feet = 0;
         for leg in contacts.legs() {
             let most = self.settings.max_vertical * contacts.share(leg);
             problem.max_vertical[problem.feet] = most;
             problem.min_vertical[problem.feet] = self.settings.min_vertical.min(most);
             problem.feet += 1;
         }
-        for row in 0..problem.unknowns() {
-            for column in 0..problem.unknowns() {
-                problem.hessian[row][column] = balance.from_forces.column(row).dot(&weighted.column(column));
+    }
+
+    /// H = Q_1 + Bᵀ Q_2 B and h = -Bᵀ Q_2 d.
+    fn set_cost(&mut self, balance: &TorsoBalance) {
+        let problem = &mut self.problem;
+        for column in 0..problem.unknowns() {
+            let mut weighted: Vector6<f64> = balance.from_forces.column(column).into_owned();
+            for (entry, weight) in weighted.iter_mut().zip(&self.settings.slack_weight) {
+                *entry *= weight;
             }
-            problem.hessian[row][row] += self.settings.force_weight;
-            problem.gradient[row] = -weighted.column(row).dot(&balance.wanted);
+            for row in 0..=column {
+                let entry = balance.from_forces.column(row).dot(&weighted);
+                problem.hessian[row][column] = entry;
+                problem.hessian[column][row] = entry;
+            }
+            problem.hessian[column][column] += self.settings.force_weight;
+            problem.gradient[column] = -weighted.dot(&balance.wanted);
         }
-        problem
+    }
+
+    /// T = A_jt B - J_cjᵀ and τ_0 = (A q̈ + b + g)_j - A_jt d of the loaded legs' joints.
+    fn set_torque_limits(
+        &mut self,
+        model: &Model,
+        dynamics: &Dynamics,
+        contacts: &ContactSet,
+        balance: &TorsoBalance,
+        unaided: &Motion,
+        weight: f64,
+    ) {
+        let limits = &mut self.problem.torque;
+        *limits = TorqueLimits::NONE;
+        for (slot, leg) in contacts.legs().enumerate() {
+            let jacobian = &dynamics.frame(Frame::Foot(leg)).jacobian;
+            for joint in leg.first_joint()..leg.first_joint() + 3 {
+                // A is symmetric.
+                let coupling = dynamics.mass_matrix().fixed_view::<6, 1>(0, 6 + joint);
+                let mut row = balance.from_forces.tr_mul(&coupling);
+                for axis in 0..3 {
+                    row[3 * slot + axis] -= jacobian[(axis, 6 + joint)];
+                }
+                let start = unaided[6 + joint] / weight - coupling.dot(&balance.wanted);
+                let most = model.max_torque[joint] / weight;
+                limits.from_forces[limits.joints] = row.into();
+                limits.lower[limits.joints] = -most - start;
+                limits.upper[limits.joints] = most - start;
+                limits.joints += 1;
+            }
+        }
     }
 
     /// The last feasible forces of the feet that are still in contact, within their present limits.
-    fn recall(&self, contacts: &ContactSet, problem: &ForceProblem, weight: f64, forces: &mut Forces) {
+    fn recall(&self, contacts: &ContactSet, weight: f64, forces: &mut Forces) {
+        let problem = &self.problem;
         *forces = [0.0; MAX_FORCES];
         for (slot, leg) in contacts.legs().enumerate() {
             let last = self.last[leg.index()] / weight;
@@ -125,10 +206,9 @@ impl ForceDistribution {
 }
 
 impl TorsoBalance {
-    /// B = A_tt⁻¹ J_ctᵀ and d = A_tt⁻¹ (A_t q̈ + b_t + g_t) / weight; nothing if A_tt has no inverse.
-    fn new(dynamics: &Dynamics, contacts: &ContactSet, acceleration: &Motion, weight: f64) -> Option<Self> {
-        let mass_matrix = dynamics.mass_matrix();
-        let torso: Matrix6<f64> = mass_matrix.fixed_view::<6, 6>(0, 0).into_owned();
+    /// B = A_tt⁻¹ J_ctᵀ and d = A_tt⁻¹ (A q̈ + b + g)_t / weight; nothing if A_tt has no inverse.
+    fn new(dynamics: &Dynamics, contacts: &ContactSet, unaided: &Motion, weight: f64) -> Option<Self> {
+        let torso: Matrix6<f64> = dynamics.mass_matrix().fixed_view::<6, 6>(0, 0).into_owned();
         let factor = torso.cholesky()?;
         let mut from_forces = SMatrix::<f64, 6, MAX_FORCES>::zeros();
         for (slot, leg) in contacts.legs().enumerate() {
@@ -136,14 +216,13 @@ impl TorsoBalance {
             let wrench = jacobian.fixed_view::<3, 6>(0, 0).transpose();
             from_forces.fixed_columns_mut::<3>(3 * slot).copy_from(&factor.solve(&wrench));
         }
-        let needed: Vector6<f64> =
-            mass_matrix.fixed_rows::<6>(0) * acceleration + dynamics.bias().fixed_rows::<6>(0);
+        let needed: Vector6<f64> = unaided.fixed_rows::<6>(0).into_owned();
         Some(Self { from_forces, wanted: factor.solve(&needed) / weight })
     }
 }
 
 /// J_cᵀ f_r: the forces that the ground's forces make on torso and joints.
-pub(super) fn ground_load(dynamics: &Dynamics, force: &[Vector3<f64>; 4]) -> Motion {
+fn ground_load(dynamics: &Dynamics, force: &[Vector3<f64>; 4]) -> Motion {
     let mut load = Motion::zeros();
     for leg in Leg::ALL {
         let jacobian = &dynamics.frame(Frame::Foot(leg)).jacobian;

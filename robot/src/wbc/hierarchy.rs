@@ -8,7 +8,8 @@
 //! x    += J_pre† (target - J x)          x stays in the span of Q and V
 //! Q    ← [Q V]                           the exact recursion N ← N (1 - J_pre† J_pre)
 //! ```
-//! so that J x of every earlier task is unchanged to rounding. (With the paper's product of the N_{i|i-1},
+//! so that J x of every earlier task is unchanged to rounding. x is kept along Q, where J x is (J Q) times its
+//! coordinates, and J Q is known from the projection. (With the paper's product of the N_{i|i-1},
 //! which do not commute, lower tasks move stance feet.)
 //!
 //! The dynamically consistent inverse is the same recursion in other coordinates: with A = LᵀL and y = L q̈,
@@ -18,148 +19,235 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::dynamics::DOF;
 
-/// Three rows of a Jacobian.
+/// Three rows of a Jacobian; rows that are zero come last.
 pub(super) type Rows = [[f64; DOF]; 3];
 
 /// Directions whose singular value is below this share of the task's Jacobian are none.
 const RANK_TOLERANCE: f64 = 1e-7;
 
-/// Above this share one pass of Gram-Schmidt leaves directions orthogonal to 1e-14.
-const WELL_CONDITIONED: f64 = 0.1;
+/// Below this share a task's triangular factor is not inverted: its singular values are looked at.
+const REGULAR: f64 = 1e-4;
+
+/// Where Gram-Schmidt leaves less than this share of a row, rounding is left too, and it goes over it again:
+/// directions are orthogonal to 1e-14.
+const CANCELLED: f64 = 0.02;
 
 /// Solutions of a stack of tasks, for `N` right-hand sides at once.
 #[derive(Debug, Clone)]
 pub(super) struct TaskChain<const N: usize> {
-    basis: [[f64; DOF]; DOF],
+    /// Q by rows, and room for the directions of the next task.
+    basis: [[f64; DOF]; DOF + 3],
+    /// How many directions are used up.
     rank: usize,
-    solutions: [[f64; DOF]; N],
+    /// J Q of the task that was projected last.
+    seen: Rows,
+    /// x of each right-hand side, along Q.
+    coordinates: [[f64; DOF + 3]; N],
 }
 
-/// A chain as it was after some of its tasks.
+/// A chain as it was after some of its tasks: directions and solutions grow at their ends only.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Mark<const N: usize> {
+pub(super) struct Mark {
     rank: usize,
-    solutions: [[f64; DOF]; N],
 }
 
-/// J_pre = U Σ Vᵀ of a task of three rows.
+/// What is left of a task: J_pre† = V S with V the directions that the chain keeps for it.
 #[derive(Debug, Clone)]
 pub(super) struct Projected {
-    /// U, by columns.
-    left: Matrix3<f64>,
-    /// Σ; zero where no direction is left.
-    singular: [f64; 3],
-    /// V, a row for each singular value that is not zero.
-    directions: Rows,
-}
-
-impl Projected {
-    /// How much of an error along each left direction is to be followed: all of it when the singular value σ
-    /// is at least `start`, and (σ / start)² below.
-    ///
-    /// It makes of 1/σ the damped σ / (σ² + λ²) with λ² = start² - σ²: exact away from singularities,
-    /// continuous into them, and never above 1 / start.
-    pub(super) fn damping(&self, start: f64) -> Matrix3<f64> {
-        let kept = self.singular.map(|sigma| if sigma >= start { 1.0 } else { (sigma / start).powi(2) });
-        self.left * Matrix3::from_diagonal(&Vector3::from(kept)) * self.left.transpose()
-    }
+    /// How many directions.
+    count: usize,
+    /// S, a row for each direction.
+    inverse: Matrix3<f64>,
+    /// D: how much of the error is to be followed; nothing stands for all of it.
+    pub(super) damping: Option<Matrix3<f64>>,
 }
 
 impl<const N: usize> TaskChain<N> {
     pub(super) const fn new() -> Self {
-        Self { basis: [[0.0; DOF]; DOF], rank: 0, solutions: [[0.0; DOF]; N] }
+        Self {
+            basis: [[0.0; DOF]; DOF + 3],
+            rank: 0,
+            seen: [[0.0; DOF]; 3],
+            coordinates: [[0.0; DOF + 3]; N],
+        }
     }
 
     /// Forgets all tasks.
-    pub(super) fn clear(&mut self) {
+    pub(super) const fn clear(&mut self) {
         self.rank = 0;
-        self.solutions = [[0.0; DOF]; N];
     }
 
     /// To come back to with [`Self::rewind`].
-    pub(super) const fn mark(&self) -> Mark<N> {
-        Mark { rank: self.rank, solutions: self.solutions }
+    pub(super) const fn mark(&self) -> Mark {
+        Mark { rank: self.rank }
     }
 
     /// Forgets the tasks since a mark.
-    pub(super) const fn rewind(&mut self, mark: &Mark<N>) {
+    pub(super) const fn rewind(&mut self, mark: Mark) {
         self.rank = mark.rank;
-        self.solutions = mark.solutions;
     }
 
-    pub(super) fn solution(&self, index: usize) -> &[f64; DOF] {
-        &self.solutions[index]
+    /// x of a right-hand side.
+    pub(super) fn solution(&self, index: usize) -> [f64; DOF] {
+        let mut solution = [0.0; DOF];
+        for (direction, coordinate) in self.basis.iter().zip(&self.coordinates[index]).take(self.rank) {
+            add(&mut solution, *coordinate, direction);
+        }
+        solution
     }
 
-    /// J_pre and its singular value decomposition.
-    pub(super) fn project(&self, rows: &Rows) -> Projected {
-        let mut free = *rows;
-        self.remove_used(&mut free);
-        let gram = Matrix3::from_fn(|row, column| dot(&free[row], &free[column]));
-        let (left, squares) = eigen(gram);
-        let size = rows.iter().map(|row| dot(row, row)).sum::<f64>().sqrt();
+    /// J_pre, its directions and its inverse; `start` says where damping starts, 0 for none.
+    ///
+    /// J_preᵀ = V Lᵀ by Gram-Schmidt gives J_pre† = V L⁻¹. Only where the least singular value σ of L may be
+    /// below `start`, or L is nearly singular, are singular values computed: see [`Self::fade`].
+    pub(super) fn project(&mut self, rows: &Rows, start: f64) -> Projected {
+        let sizes = rows.each_ref().map(|row| dot(row, row));
+        let size = (sizes[0] + sizes[1] + sizes[2]).sqrt();
+        let lower = self.orthogonalized(rows, &sizes);
+        let count = sizes.iter().filter(|size| **size > 0.0).count();
+        let leading = sizes[..count].iter().all(|size| *size > 0.0);
+        let regular = leading && self.rank + count <= DOF;
+        if regular && least_singular_value_exceeds(&lower, count, start.max(REGULAR * size)) {
+            return Projected { count, inverse: inverse_of(&lower, count), damping: None };
+        }
+        self.fade(&lower, start, RANK_TOLERANCE * size)
+    }
 
-        let mut projected = Projected { left, singular: [0.0; 3], directions: [[0.0; DOF]; 3] };
+    /// Splits rows into what the chain has used (J Q, kept in `seen`) and what is left, L V with orthonormal
+    /// directions V, kept at the end of the basis. Returns L.
+    fn orthogonalized(&mut self, rows: &Rows, sizes: &[f64; 3]) -> Matrix3<f64> {
+        let (used, free) = self.basis.split_at_mut(self.rank);
+        let mut left = *rows;
+        for (k, direction) in used.iter().enumerate() {
+            let along: [f64; 3] = std::array::from_fn(|row| dot(direction, &left[row]));
+            for row in 0..3 {
+                add(&mut left[row], -along[row], direction);
+                self.seen[row][k] = along[row];
+            }
+        }
+        let mut lower = Matrix3::zeros();
+        for row in 0..3 {
+            let (before, rest) = free.split_at_mut(row);
+            let direction = &mut left[row];
+            let mut length = sizes[row].sqrt();
+            for pass in 0..3 {
+                if pass > 0 {
+                    for unit in used.iter() {
+                        remove(direction, unit);
+                    }
+                }
+                for (column, sibling) in before.iter().enumerate() {
+                    lower[(row, column)] += remove(direction, sibling);
+                }
+                let longer = std::mem::replace(&mut length, dot(direction, direction).sqrt());
+                if length >= CANCELLED * longer {
+                    break;
+                }
+            }
+            // What is left of a row that depends on others is rounding.
+            let something = length > 1e-2 * RANK_TOLERANCE * sizes[row].sqrt();
+            lower[(row, row)] = if something { length } else { 0.0 };
+            let scale = if something { 1.0 / length } else { 0.0 };
+            rest[0] = direction.map(|entry| entry * scale);
+        }
+        lower
+    }
+
+    /// The same from the singular values, L = U Σ Wᵀ: of an error along the left direction of σ, all is
+    /// followed when σ is at least `start`, and (σ / start)² below.
+    ///
+    /// It makes of 1/σ the damped σ / (σ² + λ²) with λ² = start² - σ²: exact away from singularities,
+    /// continuous into them, and never above 1 / start. Directions with σ up to `nothing` are dropped.
+    fn fade(&mut self, lower: &Matrix3<f64>, start: f64, nothing: f64) -> Projected {
+        let (left, squares) = eigen(lower * lower.transpose());
+        let mut projected = Projected { count: 0, inverse: Matrix3::zeros(), damping: None };
+        let mut kept = [0.0; 3];
+        let mut turn = Matrix3::zeros();
         for index in 0..3 {
             let singular = squares[index].max(0.0).sqrt();
+            kept[index] = if singular >= start { 1.0 } else { (singular / start).powi(2) };
             // The last condition keeps rounding from offering more directions than there are.
-            if singular <= RANK_TOLERANCE * size || self.rank + index >= DOF {
+            if singular <= nothing || self.rank + projected.count >= DOF {
                 continue;
             }
-            let mut direction = [0.0; DOF];
-            for row in 0..3 {
-                add(&mut direction, left[(row, index)] / singular, &free[row]);
+            let mut row = left.column(index).transpose() * lower / singular;
+            for sibling in 0..projected.count {
+                let along = turn.row(sibling).dot(&row);
+                row -= turn.row(sibling) * along;
             }
-            // Where 1/σ blew rounding up, once more.
-            if singular < WELL_CONDITIONED * size {
-                self.remove_used(std::array::from_mut(&mut direction));
-            }
-            for sibling in 0..index {
-                let along = dot(&projected.directions[sibling], &direction);
-                add(&mut direction, -along, &projected.directions[sibling]);
-            }
-            let length = dot(&direction, &direction).sqrt();
-            projected.singular[index] = singular;
-            projected.directions[index] = direction.map(|entry| entry / length);
+            turn.set_row(projected.count, &(row / row.norm()));
+            projected.inverse.set_row(projected.count, &(left.column(index).transpose() / singular));
+            projected.count += 1;
         }
+        if start > 0.0 {
+            projected.damping = Some(left * Matrix3::from_diagonal(&Vector3::from(kept)) * left.transpose());
+        }
+        self.turn(&turn);
         projected
     }
 
-    /// x += J_pre† D (target - J x) for each right-hand side, with D from [`Projected::damping`]; then the
-    /// task's directions are used up.
-    pub(super) fn track(
-        &mut self,
-        rows: &Rows,
-        projected: &Projected,
-        damping: &Matrix3<f64>,
-        targets: &[Vector3<f64>; N],
-    ) {
-        for (solution, target) in self.solutions.iter_mut().zip(targets) {
-            let reached = Vector3::from_fn(|row, _| dot(&rows[row], solution));
-            let step = projected.left.transpose() * (damping * (target - reached));
-            for index in 0..3 {
-                if projected.singular[index] > 0.0 {
-                    add(solution, step[index] / projected.singular[index], &projected.directions[index]);
-                }
+    /// Combines the directions of the last task.
+    fn turn(&mut self, turn: &Matrix3<f64>) {
+        let mut turned = [[0.0; DOF]; 3];
+        for row in 0..3 {
+            for column in 0..3 {
+                add(&mut turned[row], turn[(row, column)], &self.basis[self.rank + column]);
             }
         }
-        for index in 0..3 {
-            if projected.singular[index] > 0.0 && self.rank < DOF {
-                self.basis[self.rank] = projected.directions[index];
-                self.rank += 1;
-            }
-        }
+        self.basis[self.rank..self.rank + 3].copy_from_slice(&turned);
     }
 
-    /// rows ← rows (1 - Q Qᵀ), by modified Gram-Schmidt; the rows side by side keep the processor busy.
-    fn remove_used<const ROWS: usize>(&self, rows: &mut [[f64; DOF]; ROWS]) {
-        for used in &self.basis[..self.rank] {
-            let along: [f64; ROWS] = std::array::from_fn(|row| dot(used, &rows[row]));
-            for (row, along) in rows.iter_mut().zip(along) {
-                add(row, -along, used);
+    /// x += J_pre† D (target - J x) for each right-hand side; then the directions of the task, which was
+    /// projected last, are used up.
+    pub(super) fn track(
+        &mut self,
+        projected: &Projected,
+        damping: Option<&Matrix3<f64>>,
+        targets: &[Vector3<f64>; N],
+    ) {
+        for (coordinates, target) in self.coordinates.iter_mut().zip(targets) {
+            let reached = Vector3::from_fn(|row, _| {
+                self.seen[row].iter().zip(&*coordinates).take(self.rank).map(|(seen, x)| seen * x).sum()
+            });
+            let missing = target - reached;
+            let step = projected.inverse * damping.map_or(missing, |damping| damping * missing);
+            for index in 0..projected.count {
+                coordinates[self.rank + index] = step[index];
+            }
+        }
+        self.rank += projected.count;
+    }
+}
+
+/// Whether L Lᵀ - least² 1 is positive definite, for the first rows of L.
+fn least_singular_value_exceeds(lower: &Matrix3<f64>, count: usize, least: f64) -> bool {
+    let mut rest = lower * lower.transpose() - Matrix3::identity() * (least * least);
+    for pivot in 0..count {
+        if rest[(pivot, pivot)] <= 0.0 {
+            return false;
+        }
+        for row in pivot + 1..count {
+            let factor = rest[(row, pivot)] / rest[(pivot, pivot)];
+            for column in pivot + 1..=row {
+                rest[(row, column)] -= factor * rest[(column, pivot)];
             }
         }
     }
+    true
+}
+
+/// L⁻¹ of the first rows of a lower triangle.
+fn inverse_of(lower: &Matrix3<f64>, count: usize) -> Matrix3<f64> {
+    let mut inverse = Matrix3::zeros();
+    for row in 0..count {
+        let pivot = 1.0 / lower[(row, row)];
+        for column in 0..row {
+            let sum: f64 = (column..row).map(|k| lower[(row, k)] * inverse[(k, column)]).sum();
+            inverse[(row, column)] = -sum * pivot;
+        }
+        inverse[(row, row)] = pivot;
+    }
+    inverse
 }
 
 /// Eigenvectors (columns) and eigenvalues, greatest first, of a symmetric matrix, by cyclic Jacobi rotations.
@@ -189,8 +277,8 @@ fn rotate(matrix: &mut Matrix3<f64>, vectors: &mut Matrix3<f64>, p: usize, q: us
         return;
     }
     let theta = (matrix[(q, q)] - matrix[(p, p)]) / (2.0 * off);
-    let tangent = theta.signum() / (theta.abs() + theta.hypot(1.0));
-    let cos = 1.0 / tangent.hypot(1.0);
+    let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let cos = 1.0 / (tangent * tangent + 1.0).sqrt();
     let sin = tangent * cos;
     for index in 0..3 {
         let (a, b) = (matrix[(index, p)], matrix[(index, q)]);
@@ -207,15 +295,17 @@ fn rotate(matrix: &mut Matrix3<f64>, vectors: &mut Matrix3<f64>, p: usize, q: us
     }
 }
 
-/// a · b, with partial sums that the processor can keep apart.
-pub(super) fn dot(a: &[f64; DOF], b: &[f64; DOF]) -> f64 {
-    let mut sums = [0.0; 4];
-    for block in 0..DOF / 4 {
-        for lane in 0..4 {
-            sums[lane] += a[4 * block + lane] * b[4 * block + lane];
+/// a · b, with partial sums side by side for the processor's wide registers.
+#[inline]
+fn dot(a: &[f64; DOF], b: &[f64; DOF]) -> f64 {
+    let mut sums = [0.0; 8];
+    for (a, b) in a.as_chunks::<8>().0.iter().zip(b.as_chunks::<8>().0) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
+    let halves: [f64; 4] = std::array::from_fn(|lane| sums[lane] + sums[4 + lane]);
+    (halves[0] + halves[2]) + (halves[1] + halves[3])
 }
 
 /// a += factor b
@@ -223,6 +313,13 @@ fn add(a: &mut [f64; DOF], factor: f64, b: &[f64; DOF]) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += factor * b;
     }
+}
+
+/// Takes from a vector its part along a unit vector; returns how long that was.
+fn remove(vector: &mut [f64; DOF], unit: &[f64; DOF]) -> f64 {
+    let along = dot(vector, unit);
+    add(vector, -along, unit);
+    along
 }
 
 #[cfg(test)]
@@ -250,11 +347,10 @@ mod tests {
         let low = [row(4), row(1), row(5)];
         let wish = Vector3::new(1.0, -2.0, 3.0);
         for rows in [&high, &low] {
-            let projected = sut.project(rows);
-            let damping = projected.damping(1e-3);
-            sut.track(rows, &projected, &damping, &[wish]);
+            let projected = sut.project(rows, 1e-3);
+            sut.track(&projected, projected.damping.as_ref(), &[wish]);
         }
-        let reached = Vector3::from_fn(|index, _| dot(&high[index], sut.solution(0)));
+        let reached = Vector3::from_fn(|index, _| dot(&high[index], &sut.solution(0)));
         assert!((reached - wish).amax() < 1e-12);
         assert_eq!(sut.rank, 5);
     }
@@ -266,9 +362,8 @@ mod tests {
             let mut rows = [[0.0; DOF]; 3];
             (rows[0][0], rows[1][1], rows[2][2]) = (1.0, 1.0, sigma);
             let mut sut = TaskChain::<1>::new();
-            let projected = sut.project(&rows);
-            let damping = projected.damping(START);
-            sut.track(&rows, &projected, &damping, &[Vector3::new(0.0, 0.0, 1.0)]);
+            let projected = sut.project(&rows, START);
+            sut.track(&projected, projected.damping.as_ref(), &[Vector3::new(0.0, 0.0, 1.0)]);
             sut.solution(0)[2]
         };
         assert!((answer(0.2) - 5.0).abs() < 1e-12);

@@ -47,6 +47,9 @@ pub struct WbcStatus {
     pub forces: ForceSource,
     /// Steps since the start whose forces were not found.
     pub force_failures: u64,
+    /// No contact forces keep the loaded legs' torques within limits: they were found without regard to them,
+    /// and the torques were cut.
+    pub torques_relaxed: bool,
     /// Share of the objectives' accelerations that was kept to stay below the joints' limits; 1 normally.
     pub acceleration_scale: f64,
     /// Joints that are stopped at an end of their range, or whose desired position, velocity or torque was
@@ -63,6 +66,7 @@ impl Default for WbcStatus {
         Self {
             forces: ForceSource::NoContact,
             force_failures: 0,
+            torques_relaxed: false,
             acceleration_scale: 1.0,
             limited: 0,
             grounded: 0,

@@ -9,6 +9,9 @@ use super::{
 };
 use crate::dynamics::{MassMatrix, Motion};
 
+/// Levels that fit without taking memory: four feet, all stops and all objectives.
+const LEVELS: usize = 64;
+
 /// The two chains of tasks.
 pub(super) struct Tracking {
     factor: InertiaFactor,
@@ -16,72 +19,98 @@ pub(super) struct Tracking {
     kinematic: TaskChain<2>,
     /// L ddq̄, in the metric of the mass matrix.
     dynamic: TaskChain<1>,
+    levels: Vec<Level>,
 }
 
-/// Both chains after some of their tasks.
+/// A task in its place, with what the kinematic chain found of it.
+struct Level {
+    task: Task,
+    damping: Option<Matrix3<f64>>,
+}
+
+/// After some of the tasks.
+#[derive(Clone, Copy)]
 pub(super) struct TrackingMark {
-    kinematic: Mark<2>,
-    dynamic: Mark<1>,
+    kinematic: Mark,
+    levels: usize,
 }
 
 impl Tracking {
-    pub(super) const fn new() -> Self {
-        Self { factor: InertiaFactor::new(), kinematic: TaskChain::new(), dynamic: TaskChain::new() }
+    pub(super) fn new() -> Self {
+        Self {
+            factor: InertiaFactor::new(),
+            kinematic: TaskChain::new(),
+            dynamic: TaskChain::new(),
+            levels: Vec::with_capacity(LEVELS),
+        }
     }
 
     /// Begins a step: q̄_0 = q, dq̄_0 = 0, ddq̄_0 = 0.
     pub(super) fn begin(&mut self, mass_matrix: &MassMatrix) {
         self.factor.factor(mass_matrix);
         self.kinematic.clear();
-        self.dynamic.clear();
+        self.levels.clear();
     }
 
-    /// One level of the hierarchy: the paper's three recursions, with J_pre of the exact null space.
+    /// One level of the hierarchy: the paper's first two recursions, with J_pre of the exact null space.
     ///
     /// ```text
     /// q̄_i   = q̄_{i-1}   + J_pre†  D (x̄ - x - J (q̄_{i-1} - q))
     /// dq̄_i  = dq̄_{i-1}  + J_pre†  D (dx̄ - J dq̄_{i-1})
+    /// ```
+    /// D fades a direction out as it becomes singular (not at all if `damping_start` is 0).
+    pub(super) fn add(&mut self, task: Task, damping_start: f64) {
+        let projected = self.kinematic.project(&task.rows, damping_start);
+        let damping = projected.damping;
+        self.kinematic.track(&projected, damping.as_ref(), &[task.error, task.velocity]);
+        self.levels.push(Level { task, damping });
+    }
+
+    /// ddq̄ = L⁻¹ y, after the levels up to a mark and after all: the third recursion.
+    ///
+    /// ```text
     /// ddq̄_i = ddq̄_{i-1} + J_pre‡  D (ẍ_cmd - J̇ q̇ - J ddq̄_{i-1})
     /// ```
-    /// D fades a direction out as it becomes singular (not at all if `damping_start` is 0). It comes from the
-    /// kinematic chain and serves both: J_pre loses rank in the same configurations in either metric.
-    pub(super) fn add(&mut self, task: &Task, damping_start: f64) {
-        let projected = self.kinematic.project(&task.rows);
-        let damping =
-            if damping_start > 0.0 { projected.damping(damping_start) } else { Matrix3::identity() };
-        self.kinematic.track(&task.rows, &projected, &damping, &[task.error, task.velocity]);
-
-        let mut weighed = task.rows;
-        for row in &mut weighed {
-            self.factor.weigh(row);
+    /// D is the kinematic chain's: J_pre loses rank in the same configurations in either metric. Nothing of q̄
+    /// and dq̄ depends on ddq̄, so that it is computed once, when they are settled.
+    pub(super) fn accelerations(&mut self, mark: TrackingMark) -> [Motion; 2] {
+        self.dynamic.clear();
+        let mut at_mark = Motion::zeros();
+        for (index, Level { task, damping }) in self.levels.iter().enumerate() {
+            if index == mark.levels {
+                at_mark = self.acceleration();
+            }
+            let mut weighed = task.rows;
+            self.factor.weigh(&mut weighed);
+            let projected = self.dynamic.project(&weighed, 0.0);
+            self.dynamic.track(&projected, damping.as_ref(), &[task.acceleration]);
         }
-        let projected = self.dynamic.project(&weighed);
-        self.dynamic.track(&weighed, &projected, &damping, &[task.acceleration]);
+        let after_all = self.acceleration();
+        [if mark.levels < self.levels.len() { at_mark } else { after_all }, after_all]
     }
 
     /// To come back to with [`Self::rewind`].
-    pub(super) const fn mark(&self) -> TrackingMark {
-        TrackingMark { kinematic: self.kinematic.mark(), dynamic: self.dynamic.mark() }
+    pub(super) fn mark(&self) -> TrackingMark {
+        TrackingMark { kinematic: self.kinematic.mark(), levels: self.levels.len() }
     }
 
     /// Forgets the tasks since a mark.
-    pub(super) const fn rewind(&mut self, mark: &TrackingMark) {
-        self.kinematic.rewind(&mark.kinematic);
-        self.dynamic.rewind(&mark.dynamic);
+    pub(super) fn rewind(&mut self, mark: TrackingMark) {
+        self.kinematic.rewind(mark.kinematic);
+        self.levels.truncate(mark.levels);
     }
 
     /// q̄ - q
     pub(super) fn position_step(&self) -> Motion {
-        Motion::from(*self.kinematic.solution(0))
+        Motion::from(self.kinematic.solution(0))
     }
 
     /// dq̄
     pub(super) fn velocity(&self) -> Motion {
-        Motion::from(*self.kinematic.solution(1))
+        Motion::from(self.kinematic.solution(1))
     }
 
-    /// ddq̄ = L⁻¹ y
-    pub(super) fn acceleration(&self) -> Motion {
-        Motion::from(self.factor.unweigh(self.dynamic.solution(0)))
+    fn acceleration(&self) -> Motion {
+        Motion::from(self.factor.unweigh(&self.dynamic.solution(0)))
     }
 }

@@ -3,10 +3,10 @@
 //! Goldfarb and Idnani, "A numerically stable dual method for solving strictly convex quadratic programs",
 //! Mathematical Programming 27 (1983): start at the unconstrained optimum, add one violated constraint at a
 //! time, and drop those whose multiplier turns negative. In most control steps no more than a few are active,
-//! and it takes a microsecond. It is trusted only if its result proves the optimality conditions; otherwise
-//! the interior-point method decides.
+//! and it takes a microsecond; torques are looked at when all feet are within their pyramids. It is trusted
+//! only if its result proves the optimality conditions; otherwise the interior-point method decides.
 
-use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES};
+use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES, ROWS_PER_FOOT};
 
 /// A constraint counts as violated beyond this, in body weights (1.3 µN for this robot).
 const FEASIBILITY: f64 = 1e-8;
@@ -15,7 +15,7 @@ const STATIONARITY: f64 = 1e-9;
 /// Squared length below which a constraint's normal depends on those of the active ones.
 const DEPENDENT: f64 = 1e-18;
 /// Steps before giving up; each adds or drops a constraint.
-const MAX_STEPS: usize = 60;
+const MAX_STEPS: usize = 100;
 
 /// The method's workspace.
 #[derive(Debug, Clone)]
@@ -26,6 +26,8 @@ pub struct ActiveSet {
     upper: [[f64; MAX_FORCES]; MAX_FORCES],
     active: [usize; MAX_FORCES],
     multipliers: [f64; MAX_FORCES],
+    /// The active constraints, a bit for each.
+    members: u64,
     count: usize,
     unknowns: usize,
 }
@@ -37,6 +39,7 @@ impl Default for ActiveSet {
             upper: [[0.0; MAX_FORCES]; MAX_FORCES],
             active: [0; MAX_FORCES],
             multipliers: [0.0; MAX_FORCES],
+            members: 0,
             count: 0,
             unknowns: 0,
         }
@@ -62,29 +65,28 @@ impl ActiveSet {
     fn start(&mut self, problem: &ForceProblem, forces: &mut Forces) -> Result<(), ForceFailure> {
         let n = problem.unknowns();
         self.unknowns = n;
-        self.count = 0;
+        (self.count, self.members) = (0, 0);
         let mut lower = problem.hessian;
+        let mut inverse = [0.0; MAX_FORCES];
         for row in 0..n {
-            for column in 0..=row {
-                let mut sum = lower[row][column];
-                for k in 0..column {
-                    sum -= lower[row][k] * lower[column][k];
-                }
-                lower[row][column] = if row == column { sum.sqrt() } else { sum / lower[column][column] };
+            for column in 0..row {
+                let known: f64 = (0..column).map(|k| lower[row][k] * lower[column][k]).sum();
+                lower[row][column] = (lower[row][column] - known) * inverse[column];
             }
-            if !(lower[row][row].is_finite() && lower[row][row] > 0.0) {
+            let known: f64 = lower[row][..row].iter().map(|entry| entry * entry).sum();
+            let pivot = lower[row][row] - known;
+            if !(pivot.is_finite() && pivot > 0.0) {
                 return Err(ForceFailure::Numerical);
             }
+            inverse[row] = 1.0 / pivot.sqrt();
         }
         // Column by column of L⁻¹, which is row by row of J.
         self.basis = [[0.0; MAX_FORCES]; MAX_FORCES];
         for column in 0..n {
-            for row in column..n {
-                let mut sum = if row == column { 1.0 } else { 0.0 };
-                for k in column..row {
-                    sum -= lower[row][k] * self.basis[column][k];
-                }
-                self.basis[column][row] = sum / lower[row][row];
+            self.basis[column][column] = inverse[column];
+            for row in column + 1..n {
+                let known: f64 = (column..row).map(|k| lower[row][k] * self.basis[column][k]).sum();
+                self.basis[column][row] = -known * inverse[row];
             }
         }
         let weighed = self.transformed(&problem.gradient);
@@ -111,15 +113,30 @@ impl ActiveSet {
         result
     }
 
+    /// The constraint that is furthest outside: of the feet's, else of the torques'.
     fn most_violated(&self, problem: &ForceProblem, forces: &Forces) -> Option<usize> {
-        let mut worst = (-FEASIBILITY, None);
-        for index in 0..problem.rows() {
-            let slack = problem.slack(index, forces);
-            if slack < worst.0 && !self.active[..self.count].contains(&index) {
-                worst = (slack, Some(index));
+        let mut worst = Worst { members: self.members, slack: -FEASIBILITY, index: None };
+        for (foot, force) in forces.as_chunks::<3>().0.iter().enumerate().take(problem.feet) {
+            let [x, y, z] = *force;
+            let side = problem.friction * z;
+            let slacks = [
+                side - x,
+                side + x,
+                side - y,
+                side + y,
+                z - problem.min_vertical[foot],
+                problem.max_vertical[foot] - z,
+            ];
+            worst.consider(ROWS_PER_FOOT * foot, &slacks);
+        }
+        if worst.index.is_none() {
+            for joint in 0..problem.torque.joints {
+                let torque = problem.torque.torque(joint, forces);
+                let slacks = [torque - problem.torque.lower[joint], problem.torque.upper[joint] - torque];
+                worst.consider(problem.foot_rows() + 2 * joint, &slacks);
             }
         }
-        worst.1
+        worst.index
     }
 
     /// Moves until one violated constraint is active, dropping those that stand in the way.
@@ -130,7 +147,7 @@ impl ActiveSet {
         forces: &mut Forces,
         steps: &mut usize,
     ) -> Result<(), ForceFailure> {
-        let normal = full_normal(problem, violated);
+        let normal = problem.normal(violated);
         let mut multiplier = 0.0;
         loop {
             *steps += 1;
@@ -203,6 +220,7 @@ impl ActiveSet {
             self.upper[row][self.count] = d[row];
         }
         self.active[self.count] = constraint;
+        self.members |= 1 << constraint;
         self.multipliers[self.count] = multiplier;
         self.count += 1;
         Ok(())
@@ -210,6 +228,7 @@ impl ActiveSet {
 
     /// Makes an active constraint inactive: removes its column of R and restores the triangle.
     fn drop(&mut self, index: usize) {
+        self.members &= !(1 << self.active[index]);
         self.count -= 1;
         for column in index..self.count {
             self.active[column] = self.active[column + 1];
@@ -238,7 +257,7 @@ impl ActiveSet {
     fn proves(&self, problem: &ForceProblem, forces: &Forces) -> bool {
         let mut rest = problem.cost_gradient(forces);
         for index in 0..self.count {
-            let normal = full_normal(problem, self.active[index]);
+            let normal = problem.normal(self.active[index]);
             for entry in 0..self.unknowns {
                 rest[entry] -= self.multipliers[index] * normal[entry];
             }
@@ -252,12 +271,21 @@ impl ActiveSet {
     }
 }
 
-/// A constraint's normal over all unknowns.
-fn full_normal(problem: &ForceProblem, index: usize) -> Forces {
-    let row = problem.row(index);
-    let mut normal = [0.0; MAX_FORCES];
-    normal[3 * row.foot..3 * row.foot + 3].copy_from_slice(&row.normal);
-    normal
+/// The worst of the constraints seen so far that are not active.
+struct Worst {
+    members: u64,
+    slack: f64,
+    index: Option<usize>,
+}
+
+impl Worst {
+    fn consider(&mut self, first: usize, slacks: &[f64]) {
+        for (index, slack) in (first..).zip(slacks) {
+            if *slack < self.slack && self.members & (1 << index) == 0 {
+                (self.slack, self.index) = (*slack, Some(index));
+            }
+        }
+    }
 }
 
 /// cos and sin that turn (a, b) into (length, 0).
@@ -265,7 +293,7 @@ fn givens(a: f64, b: f64) -> (f64, f64, f64) {
     if b == 0.0 {
         return (1.0, 0.0, a);
     }
-    let length = a.hypot(b);
+    let length = (a * a + b * b).sqrt();
     (a / length, b / length, length)
 }
 

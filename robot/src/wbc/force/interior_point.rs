@@ -1,9 +1,10 @@
 //! Clarabel behind the active set: slower, but it decides every problem.
 //!
-//! One solver for each number of feet, set up once and updated in place, which needs a stored dense pattern
-//! and no presolve. There is no time limit, because Clarabel's clock runs on over updates; the cap on
-//! iterations bounds the time instead. A solve allocates a little inside Clarabel; that happens only in the
-//! rare step whose active set was not proved.
+//! One solver for each number of feet, with and without torque limits, set up once and updated in place,
+//! which needs a stored dense pattern and no presolve. The torque limits are left out first: forces that
+//! satisfy them all the same are optimal with them too. There is no time limit, because Clarabel's clock runs
+//! on over updates; the cap on iterations bounds the time instead. A solve allocates a little inside
+//! Clarabel; that happens only in the rare step whose active set was not proved.
 
 use clarabel::{
     algebra::CscMatrix,
@@ -23,7 +24,8 @@ const MAX_ITERATIONS: u32 = 50;
 /// The interior-point method, ready for one to four feet.
 pub struct InteriorPoint {
     /// For one, two, three and four feet; nothing if Clarabel refused its setup.
-    prepared: [Option<Prepared>; 4],
+    feet_alone: [Option<Prepared>; 4],
+    with_torques: [Option<Prepared>; 4],
 }
 
 /// A solver, and the numbers that it gets before each solve.
@@ -32,13 +34,25 @@ struct Prepared {
     /// Upper triangle of H, by columns.
     hessian: Vec<f64>,
     gradient: Vec<f64>,
+    /// -W, by columns.
+    constraints: Vec<f64>,
+    /// Where each column of W ends.
+    ends: Vec<usize>,
     bounds: Vec<f64>,
 }
 
 impl InteriorPoint {
     /// Sets up all solvers for a friction coefficient.
     pub fn new(friction: f64) -> Self {
-        Self { prepared: std::array::from_fn(|index| set_up(index + 1, friction)) }
+        let set_up = |joints: usize| {
+            std::array::from_fn(|index| {
+                let mut pattern = ForceProblem::new(friction);
+                pattern.feet = index + 1;
+                pattern.torque.joints = joints * pattern.feet;
+                Prepared::new(&pattern)
+            })
+        };
+        Self { feet_alone: set_up(0), with_torques: set_up(3) }
     }
 }
 
@@ -47,30 +61,100 @@ impl ForceSolver for InteriorPoint {
         if !problem.is_finite() {
             return Err(ForceFailure::NotFinite);
         }
-        let prepared = problem.feet.checked_sub(1).and_then(|index| self.prepared.get_mut(index));
-        let Some(Some(Prepared { solver, hessian, gradient, bounds })) = prepared else {
+        let Some(index) = problem.feet.checked_sub(1) else { return Err(ForceFailure::Numerical) };
+        let [Some(Some(feet_alone)), Some(Some(with_torques))] =
+            [self.feet_alone.get_mut(index), self.with_torques.get_mut(index)]
+        else {
             return Err(ForceFailure::Numerical);
         };
+        feet_alone.solve(problem, forces)?;
+        let torque = &problem.torque;
+        let within = (0..torque.joints)
+            .all(|joint| (torque.lower[joint]..=torque.upper[joint]).contains(&torque.torque(joint, forces)));
+        if within { Ok(()) } else { with_torques.solve(problem, forces) }
+    }
+}
+
+impl Prepared {
+    /// A solver for problems of a pattern; their numbers come before each solve.
+    fn new(pattern: &ForceProblem) -> Option<Self> {
+        let n = pattern.unknowns();
+        let mut hessian = (Vec::new(), Vec::new(), Vec::new());
+        for column in 0..n {
+            for row in 0..=column {
+                hessian.0.push(row);
+                hessian.1.push(column);
+                hessian.2.push(if row == column { 1.0 } else { 0.0 });
+            }
+        }
+        let mut constraints = (Vec::new(), Vec::new(), Vec::new());
+        for row in 0..pattern.rows() {
+            for (column, entry) in pattern.normal(row).into_iter().enumerate().take(n) {
+                if entry != 0.0 || row >= pattern.foot_rows() {
+                    constraints.0.push(row);
+                    constraints.1.push(column);
+                    constraints.2.push(-entry);
+                }
+            }
+        }
+        let settings = DefaultSettings {
+            verbose: false,
+            max_iter: MAX_ITERATIONS,
+            tol_gap_abs: GAP_TOLERANCE,
+            tol_gap_rel: GAP_TOLERANCE,
+            tol_feas: FEASIBILITY,
+            presolve_enable: false,
+            input_sparse_dropzeros: false,
+            // The problem comes scaled, and a scaling of the setup's numbers would not fit later ones.
+            equilibrate_enable: false,
+            ..DefaultSettings::default()
+        };
+        let (hessian_entries, bounds) = (hessian.2.len(), vec![1.0; pattern.rows()]);
+        let constraints =
+            CscMatrix::new_from_triplets(pattern.rows(), n, constraints.0, constraints.1, constraints.2);
+        let solver = DefaultSolver::new(
+            &CscMatrix::new_from_triplets(n, n, hessian.0, hessian.1, hessian.2),
+            &vec![0.0; n],
+            &constraints,
+            &bounds,
+            &[NonnegativeConeT(pattern.rows())],
+            settings,
+        )
+        .ok()?;
+        Some(Self {
+            solver,
+            hessian: vec![0.0; hessian_entries],
+            gradient: vec![0.0; n],
+            constraints: constraints.nzval,
+            ends: constraints.colptr[1..].to_vec(),
+            bounds,
+        })
+    }
+
+    fn solve(&mut self, problem: &ForceProblem, forces: &mut Forces) -> Result<(), ForceFailure> {
         let n = problem.unknowns();
         let upper = (0..n).flat_map(|column| (0..=column).map(move |row| (row, column)));
-        for (entry, (row, column)) in hessian.iter_mut().zip(upper) {
+        for (entry, (row, column)) in self.hessian.iter_mut().zip(upper) {
             *entry = problem.hessian[row][column];
         }
-        gradient.copy_from_slice(&problem.gradient[..n]);
-        // Clarabel's rows are W f + s = bound with s >= 0, ours W f >= bound.
-        for (index, bound) in bounds.iter_mut().enumerate() {
-            *bound = -problem.row(index).bound;
+        self.gradient.copy_from_slice(&problem.gradient[..n]);
+        // Clarabel's rows are -W f + s = -bound with s >= 0.
+        for (index, bound) in self.bounds.iter_mut().enumerate() {
+            *bound = -problem.bound(index);
         }
-        let updated = solver.update_P(hessian).is_ok()
-            && solver.update_q(gradient).is_ok()
-            && solver.update_b(bounds).is_ok();
+        let torques = self.bounds.len() - problem.foot_rows();
+        let updated = self.solver.update_P(&self.hessian).is_ok()
+            && self.solver.update_q(&self.gradient).is_ok()
+            && self.solver.update_b(&self.bounds).is_ok()
+            && (torques == 0 || self.update_torques(problem, torques));
         if !updated {
             return Err(ForceFailure::Numerical);
         }
-        solver.solve();
-        match solver.solution.status {
+        self.solver.solve();
+        match self.solver.solution.status {
             SolverStatus::Solved => {
-                forces[..n].copy_from_slice(&solver.solution.x);
+                *forces = [0.0; MAX_FORCES];
+                forces[..n].copy_from_slice(&self.solver.solution.x);
                 Ok(())
             }
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
@@ -80,61 +164,17 @@ impl ForceSolver for InteriorPoint {
             _ => Err(ForceFailure::Numerical),
         }
     }
-}
 
-/// A solver for `feet` feet, on a problem of the right pattern whose numbers are replaced before each solve.
-fn set_up(feet: usize, friction: f64) -> Option<Prepared> {
-    let pattern = ForceProblem {
-        feet,
-        hessian: [[0.0; MAX_FORCES]; MAX_FORCES],
-        gradient: [0.0; MAX_FORCES],
-        friction,
-        min_vertical: [0.0; 4],
-        max_vertical: [1.0; 4],
-    };
-    let n = pattern.unknowns();
-    let mut hessian = (Vec::new(), Vec::new(), Vec::new());
-    for column in 0..n {
-        for row in 0..=column {
-            hessian.0.push(row);
-            hessian.1.push(column);
-            hessian.2.push(if row == column { 1.0 } else { 0.0 });
-        }
-    }
-    let mut constraints = (Vec::new(), Vec::new(), Vec::new());
-    let mut bounds = Vec::new();
-    for index in 0..pattern.rows() {
-        let row = pattern.row(index);
-        bounds.push(-row.bound);
-        for (axis, entry) in row.normal.into_iter().enumerate() {
-            if entry != 0.0 {
-                constraints.0.push(index);
-                constraints.1.push(3 * row.foot + axis);
-                constraints.2.push(-entry);
+    /// The torques' rows stand at the end of each column.
+    fn update_torques(&mut self, problem: &ForceProblem, rows: usize) -> bool {
+        for (column, end) in self.ends.iter().enumerate() {
+            for (joint, pair) in
+                self.constraints[end - rows..*end].as_chunks_mut::<2>().0.iter_mut().enumerate()
+            {
+                let from = problem.torque.from_forces[joint][column];
+                *pair = [-from, from];
             }
         }
+        self.solver.update_A(&self.constraints).is_ok()
     }
-    let settings = DefaultSettings {
-        verbose: false,
-        max_iter: MAX_ITERATIONS,
-        tol_gap_abs: GAP_TOLERANCE,
-        tol_gap_rel: GAP_TOLERANCE,
-        tol_feas: FEASIBILITY,
-        presolve_enable: false,
-        input_sparse_dropzeros: false,
-        // The problem comes scaled, and a scaling of the setup's numbers would not fit later ones.
-        equilibrate_enable: false,
-        ..DefaultSettings::default()
-    };
-    let entries = hessian.2.len();
-    let solver = DefaultSolver::new(
-        &CscMatrix::new_from_triplets(n, n, hessian.0, hessian.1, hessian.2),
-        &vec![0.0; n],
-        &CscMatrix::new_from_triplets(pattern.rows(), n, constraints.0, constraints.1, constraints.2),
-        &bounds,
-        &[NonnegativeConeT(pattern.rows())],
-        settings,
-    )
-    .ok()?;
-    Some(Prepared { solver, hessian: vec![0.0; entries], gradient: vec![0.0; n], bounds })
 }

@@ -1,4 +1,4 @@
-//! Contact forces: the paper's quadratic program with the slack δ_t eliminated.
+//! Contact forces: the paper's quadratic program with the slack δ_t eliminated, and with torque limits.
 //!
 //! The torso's six equations of motion, with the joints' accelerations in them,
 //!
@@ -8,10 +8,15 @@
 //! give δ_t = B f - d with B = A_tt⁻¹ J_ctᵀ and d = A_tt⁻¹ (A_t q̈ + b_t + g_t). What remains is
 //!
 //! ```text
-//! min  fᵀ Q_1 f + (B f - d)ᵀ Q_2 (B f - d)    s.t.  |f_x|, |f_y| <= µ f_z,  f_min <= f_z <= f_max
+//! min  fᵀ Q_1 f + (B f - d)ᵀ Q_2 (B f - d)
+//! s.t. |f_x|, |f_y| <= µ f_z,   f_min <= f_z <= f_max,   τ_min <= τ_0 + T f <= τ_max
 //! ```
-//! over the 3n forces of n feet. Forces and d are in units of the robot's weight: solvers stop at absolute
-//! tolerances, and in newtons they stop newtons away. There are always forces that satisfy the constraints.
+//! over the 3n forces of n feet. The torques of the loaded legs' joints are affine in the forces: with
+//! τ = A (q̈ + δ_t) + b + g - J_cᵀ f, τ_0 is the torque without forces and T = A_jt B - J_cjᵀ.
+//!
+//! Forces and d are in units of the robot's weight, torques in body weights times a metre: solvers stop at
+//! absolute tolerances, and in newtons they stop newtons away. There are always forces within pyramids and
+//! normal forces; the torque limits may leave none.
 
 mod active_set;
 mod interior_point;
@@ -21,14 +26,14 @@ pub use interior_point::InteriorPoint;
 
 use super::ForceFailure;
 
-/// Most unknowns: three for each foot.
+/// Most unknowns: three for each foot. As many joints have torque limits.
 pub const MAX_FORCES: usize = 12;
-/// Constraints of each foot.
+/// Constraints of each foot's force.
 pub const ROWS_PER_FOOT: usize = 6;
 /// Forces of the feet in contact, three for each foot, in body weights.
 pub type Forces = [f64; MAX_FORCES];
 
-/// min ½ fᵀ H f + hᵀ f within each foot's friction pyramid; entries beyond 3 `feet` are not used.
+/// min ½ fᵀ H f + hᵀ f within pyramids and torque limits; entries beyond 3 `feet` are not used.
 #[derive(Debug, Clone)]
 pub struct ForceProblem {
     /// How many feet stand on the ground.
@@ -43,17 +48,21 @@ pub struct ForceProblem {
     pub min_vertical: [f64; 4],
     /// Greatest vertical force of each foot.
     pub max_vertical: [f64; 4],
+    /// Torque limits of the loaded legs.
+    pub torque: TorqueLimits,
 }
 
-/// A constraint n · f >= bound on one foot's force.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    /// Which of the feet in contact.
-    pub foot: usize,
-    /// n
-    pub normal: [f64; 3],
-    /// Its right-hand side.
-    pub bound: f64,
+/// lower <= T f <= upper for some joints.
+#[derive(Debug, Clone)]
+pub struct TorqueLimits {
+    /// How many joints: three for each foot, or none.
+    pub joints: usize,
+    /// T, a row for each joint, m.
+    pub from_forces: [[f64; MAX_FORCES]; MAX_FORCES],
+    /// τ_min - τ_0, body weights times a metre.
+    pub lower: [f64; MAX_FORCES],
+    /// τ_max - τ_0, body weights times a metre.
+    pub upper: [f64; MAX_FORCES],
 }
 
 /// Finds the forces.
@@ -63,37 +72,80 @@ pub trait ForceSolver {
 }
 
 impl ForceProblem {
+    /// Of no feet.
+    pub const fn new(friction: f64) -> Self {
+        Self {
+            feet: 0,
+            hessian: [[0.0; MAX_FORCES]; MAX_FORCES],
+            gradient: [0.0; MAX_FORCES],
+            friction,
+            min_vertical: [0.0; 4],
+            max_vertical: [0.0; 4],
+            torque: TorqueLimits::NONE,
+        }
+    }
+
     /// Number of unknowns.
     pub const fn unknowns(&self) -> usize {
         3 * self.feet
     }
 
-    /// Number of constraints.
-    pub const fn rows(&self) -> usize {
+    /// Number of constraints on single feet; those on torques follow.
+    pub const fn foot_rows(&self) -> usize {
         ROWS_PER_FOOT * self.feet
     }
 
-    /// W f >= bound, one row of it: four sides of the pyramid, least and greatest vertical force, foot by
-    /// foot.
-    pub fn row(&self, index: usize) -> Row {
-        let foot = index / ROWS_PER_FOOT;
-        let mu = self.friction;
-        let (normal, bound) = match index % ROWS_PER_FOOT {
-            0 => ([-1.0, 0.0, mu], 0.0),
-            1 => ([1.0, 0.0, mu], 0.0),
-            2 => ([0.0, -1.0, mu], 0.0),
-            3 => ([0.0, 1.0, mu], 0.0),
-            4 => ([0.0, 0.0, 1.0], self.min_vertical[foot]),
-            _ => ([0.0, 0.0, -1.0], -self.max_vertical[foot]),
-        };
-        Row { foot, normal, bound }
+    /// Number of constraints.
+    pub const fn rows(&self) -> usize {
+        self.foot_rows() + 2 * self.torque.joints
     }
 
-    /// How far the forces are inside the constraint (negative: outside).
+    /// Right-hand side of a constraint n · f >= bound.
+    ///
+    /// First come, foot by foot, the four sides of the pyramid, least and greatest vertical force; then,
+    /// joint by joint, least and greatest torque.
+    pub fn bound(&self, index: usize) -> f64 {
+        if index < self.foot_rows() {
+            let foot = index / ROWS_PER_FOOT;
+            return match index % ROWS_PER_FOOT {
+                4 => self.min_vertical[foot],
+                5 => -self.max_vertical[foot],
+                _ => 0.0,
+            };
+        }
+        let row = index - self.foot_rows();
+        if row % 2 == 0 { self.torque.lower[row / 2] } else { -self.torque.upper[row / 2] }
+    }
+
+    /// n of a constraint.
+    pub fn normal(&self, index: usize) -> Forces {
+        let mut normal = [0.0; MAX_FORCES];
+        if index < self.foot_rows() {
+            let mu = self.friction;
+            let own = match index % ROWS_PER_FOOT {
+                0 => [-1.0, 0.0, mu],
+                1 => [1.0, 0.0, mu],
+                2 => [0.0, -1.0, mu],
+                3 => [0.0, 1.0, mu],
+                4 => [0.0, 0.0, 1.0],
+                _ => [0.0, 0.0, -1.0],
+            };
+            let foot = index / ROWS_PER_FOOT;
+            normal[3 * foot..3 * foot + 3].copy_from_slice(&own);
+            return normal;
+        }
+        let row = index - self.foot_rows();
+        let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+        for (entry, from) in normal.iter_mut().zip(&self.torque.from_forces[row / 2][..self.unknowns()]) {
+            *entry = sign * from;
+        }
+        normal
+    }
+
+    /// How far forces are inside a constraint (negative: outside).
     pub fn slack(&self, index: usize, forces: &Forces) -> f64 {
-        let row = self.row(index);
-        let force = &forces[3 * row.foot..3 * row.foot + 3];
-        row.normal[0] * force[0] + row.normal[1] * force[1] + row.normal[2] * force[2] - row.bound
+        let normal = self.normal(index);
+        normal.iter().zip(forces).map(|(entry, force)| entry * force).sum::<f64>() - self.bound(index)
     }
 
     /// H f + h
@@ -110,7 +162,26 @@ impl ForceProblem {
     /// Whether all numbers in use are finite.
     pub fn is_finite(&self) -> bool {
         let used = self.unknowns();
-        self.gradient[..used].iter().all(|entry| entry.is_finite())
-            && self.hessian[..used].iter().all(|row| row[..used].iter().all(|entry| entry.is_finite()))
+        let finite = |entries: &[f64]| entries.iter().all(|entry| entry.is_finite());
+        finite(&self.gradient[..used])
+            && self.hessian[..used].iter().all(|row| finite(&row[..used]))
+            && self.torque.from_forces[..self.torque.joints].iter().all(|row| finite(&row[..used]))
+            && finite(&self.torque.lower[..self.torque.joints])
+            && finite(&self.torque.upper[..self.torque.joints])
+    }
+}
+
+impl TorqueLimits {
+    /// Of no joints.
+    pub const NONE: Self = Self {
+        joints: 0,
+        from_forces: [[0.0; MAX_FORCES]; MAX_FORCES],
+        lower: [0.0; MAX_FORCES],
+        upper: [0.0; MAX_FORCES],
+    };
+
+    /// T f of a joint.
+    pub fn torque(&self, joint: usize, forces: &Forces) -> f64 {
+        self.from_forces[joint].iter().zip(forces).map(|(from, force)| from * force).sum()
     }
 }
