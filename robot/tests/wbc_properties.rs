@@ -2,23 +2,24 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
-use std::path::Path;
+mod situations;
 
 use locoman_robot::{
-    dynamics::{Motion, State},
-    joints::{JointVector, Leg, Side},
+    dynamics::{Dynamics, Motion, State},
+    joints::{JOINTS, JointVector, Leg, Side},
     model::{Frame, Model},
     wbc::{
-        ContactSet, ForceSource, Objective, PointReference, RotationReference, WbcFault, WbcOutput,
+        ContactSet, ForceSource, Objective, PointReference, RotationReference, Tracked, WbcFault, WbcOutput,
         WbcSettings, WholeBodyController,
     },
 };
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
-use proptest::prelude::*;
+use nalgebra::{UnitQuaternion, Vector3};
+use situations::{Case, Random, model};
 
-fn model() -> Model {
-    Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-}
+/// Random states of each mode.
+const STATES: u64 = 100_000;
+/// m/s, m/s² and their angular kin.
+const NOTHING: f64 = 1e-8;
 
 fn stand() -> JointVector {
     let mut position = JointVector::zeros();
@@ -30,50 +31,6 @@ fn stand() -> JointVector {
         position.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from_slice(&stow);
     }
     position
-}
-
-/// Near standing, right arm deployed; legs, arm and torso moved and moving at random.
-fn state() -> impl Strategy<Value = State> {
-    let numbers = |range: f64, count| prop::collection::vec(-range..range, count);
-    (numbers(0.25, 18), numbers(1.0, 18), numbers(0.3, 6), numbers(0.3, 6)).prop_map(
-        |(joints, speeds, twist, pose)| {
-            let mut position = stand();
-            position.fixed_rows_mut::<3>(Side::Right.first_arm_joint()).copy_from_slice(&[-0.4, 0.2, 0.3]);
-            State {
-                world_from_torso: Isometry3::from_parts(
-                    Translation3::new(pose[0], pose[1], pose[2]),
-                    UnitQuaternion::from_euler_angles(pose[3], pose[4], pose[5]),
-                ),
-                torso_twist: Vector6::from_vec(twist),
-                position: position + JointVector::from_vec(joints),
-                velocity: JointVector::from_vec(speeds),
-            }
-        },
-    )
-}
-
-/// Small demands of every kind, in the order of a mode.
-fn references() -> impl Strategy<Value = Vec<Vector3<f64>>> {
-    prop::collection::vec((-0.03..0.03_f64, -0.03..0.03_f64, -0.03..0.03_f64), 15)
-        .prop_map(|triples| triples.into_iter().map(|(x, y, z)| Vector3::new(x, y, z)).collect())
-}
-
-/// Settings whose limits never act, so that the laws of the hierarchy are seen alone.
-fn unlimited() -> WbcSettings {
-    let mut settings = WbcSettings { max_joint_acceleration: 1e9, ..WbcSettings::default() };
-    let objectives = &mut settings.objectives;
-    for gains in [
-        &mut objectives.torso_position,
-        &mut objectives.torso_orientation,
-        &mut objectives.foot_position,
-        &mut objectives.gripper_position,
-        &mut objectives.gripper_orientation,
-        &mut objectives.arm_posture,
-    ] {
-        gains.max_error = 10.0;
-        gains.max_acceleration = 1e9;
-    }
-    settings
 }
 
 struct Bench {
@@ -93,34 +50,6 @@ impl Bench {
     }
 }
 
-fn point(at: Vector3<f64>, demand: &[Vector3<f64>]) -> PointReference {
-    PointReference { position: at + demand[0], velocity: demand[1], acceleration: demand[2] * 30.0 }
-}
-
-fn turned(at: UnitQuaternion<f64>, demand: &[Vector3<f64>]) -> RotationReference {
-    RotationReference {
-        orientation: UnitQuaternion::from_scaled_axis(demand[0]) * at,
-        angular_velocity: demand[1],
-        angular_acceleration: demand[2] * 30.0,
-    }
-}
-
-/// Three-legged single-gripper manipulation, right side.
-fn single_gripper(bench: &mut Bench, state: &State, demands: &[Vector3<f64>]) -> Vec<Objective> {
-    bench.step(state, &[], &ContactSet::STANCE);
-    let dynamics = bench.sut.dynamics();
-    let torso = dynamics.frame(Frame::Torso).world_from_frame;
-    let gripper = dynamics.frame(Frame::Gripper(Side::Right)).world_from_frame;
-    let left = state.position.fixed_rows::<3>(Side::Left.first_arm_joint()).into_owned();
-    vec![
-        Objective::TorsoPosition(point(torso.translation.vector, &demands[0..3])),
-        Objective::TorsoOrientation(turned(torso.rotation, &demands[3..6])),
-        Objective::GripperPosition(Side::Right, point(gripper.translation.vector, &demands[6..9])),
-        Objective::GripperOrientation(Side::Right, turned(gripper.rotation, &demands[9..12])),
-        Objective::ArmPosture(Side::Left, point(left, &demands[12..15])),
-    ]
-}
-
 /// The acceleration of torso and joints that the output's torques and forces make.
 fn forward_dynamics(bench: &Bench) -> Motion {
     let dynamics = bench.sut.dynamics();
@@ -129,65 +58,155 @@ fn forward_dynamics(bench: &Bench) -> Motion {
         let jacobian = dynamics.frame(Frame::Foot(leg)).jacobian;
         force += jacobian.fixed_rows::<3>(0).tr_mul(&bench.output.foot_force[leg.index()]);
     }
-    for joint in 0..18 {
+    for joint in 0..JOINTS {
         force[6 + joint] += bench.output.torque[joint];
     }
     dynamics.mass_matrix().cholesky().unwrap().solve(&force)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn torques_and_forces_satisfy_the_equations_of_motion(state in state(), demands in references()) {
-        let mut bench = Bench::new(unlimited());
-        let objectives = single_gripper(&mut bench, &state, &demands);
-        let contacts = ContactSet::without(Leg::FrontRight);
-        let output = bench.step(&state, &objectives, &contacts);
-        prop_assume!(output.status.limited == 0);
-        prop_assert_eq!(output.status.forces, ForceSource::ActiveSet);
-
-        // What the stance feet do, apart from what the forces cannot give.
-        let mut acceleration = forward_dynamics(&bench);
-        for axis in 0..6 {
-            acceleration[axis] -= output.torso_slack[axis];
-        }
-        for leg in contacts.legs() {
-            let foot = bench.sut.dynamics().frame(Frame::Foot(leg));
-            let motion = foot.jacobian * acceleration + foot.bias_acceleration;
-            prop_assert!(motion.fixed_rows::<3>(0).amax() < 1e-6, "{leg:?} accelerates by {motion}");
-        }
+/// Nothing moves a stance foot.
+fn stance_feet_rest(bench: &Bench, contacts: &ContactSet, tracked: &Tracked) {
+    for leg in contacts.legs() {
+        let foot = bench.sut.dynamics().frame(Frame::Foot(leg));
+        let jacobian = foot.jacobian.fixed_rows::<3>(0);
+        assert!((jacobian * tracked.step).amax() < NOTHING, "{leg:?} is moved");
+        assert!((jacobian * tracked.velocity).amax() < NOTHING, "{leg:?} has a velocity");
+        let acceleration = jacobian * tracked.acceleration + foot.bias_acceleration.fixed_rows::<3>(0);
+        assert!(acceleration.amax() < NOTHING, "{leg:?} is accelerated by {}", acceleration.amax());
     }
+}
 
-    #[test]
-    fn forces_lie_in_the_friction_pyramid(state in state(), demands in references()) {
-        let mut bench = Bench::new(WbcSettings::default());
-        let objectives = single_gripper(&mut bench, &state, &demands);
-        let contacts = ContactSet::without(Leg::FrontRight).with_share(Leg::RearLeft, 0.3);
-        let output = bench.step(&state, &objectives, &contacts);
-        let settings = WbcSettings::default().contact;
-        let weight = bench.model.mass() * 9.81;
-        for leg in Leg::ALL {
-            let force = output.foot_force[leg.index()];
-            let most = settings.max_vertical * weight * contacts.share(leg);
-            prop_assert!(force.z <= most + 1e-4 && force.z >= 0.0);
-            prop_assert!(force.x.abs().max(force.y.abs()) <= settings.friction * force.z + 1e-4);
+/// What a motion does to what an objective controls.
+fn effect(dynamics: &Dynamics, objective: &Objective, motion: &Motion) -> Vector3<f64> {
+    let (frame, first) = match objective {
+        Objective::TorsoPosition(_) => (Frame::Torso, 0),
+        Objective::TorsoOrientation(_) => (Frame::Torso, 3),
+        Objective::FootPosition(leg, _) => (Frame::Foot(*leg), 0),
+        Objective::GripperPosition(side, _) => (Frame::Gripper(*side), 0),
+        Objective::GripperOrientation(side, _) => (Frame::Gripper(*side), 3),
+        Objective::ArmPosture(side, _) => {
+            return motion.fixed_rows::<3>(6 + side.first_arm_joint()).into_owned();
         }
-    }
+    };
+    (dynamics.frame(frame).jacobian * motion).fixed_rows::<3>(first).into_owned()
+}
 
-    #[test]
-    fn torques_positions_and_velocities_stay_within_limits(state in state(), demands in references()) {
-        let mut bench = Bench::new(WbcSettings::default());
-        let demands: Vec<_> = demands.iter().map(|demand| demand * 30.0).collect();
-        let objectives = single_gripper(&mut bench, &state, &demands);
-        let output = bench.step(&state, &objectives, &ContactSet::without(Leg::FrontRight));
-        let model = &bench.model;
-        for joint in 0..18 {
-            prop_assert!(output.torque[joint].abs() <= model.max_torque[joint]);
-            prop_assert!(output.velocity[joint].abs() <= model.max_velocity[joint]);
-            prop_assert!((model.lower[joint]..=model.upper[joint]).contains(&output.position[joint]));
-        }
+/// What is tracked with all objectives is, for the first of them, what is tracked with these alone.
+fn lower_objectives_disturb_nothing(bench: &Bench, higher: &[Objective], [all, alone]: [&Tracked; 2]) {
+    for objective in higher {
+        let kind = objective.kind();
+        let apart = |all: &Motion, alone: &Motion| {
+            let dynamics = bench.sut.dynamics();
+            (effect(dynamics, objective, all) - effect(dynamics, objective, alone)).amax()
+        };
+        assert!(apart(&all.step, &alone.step) < NOTHING, "step of {kind:?}");
+        assert!(apart(&all.velocity, &alone.velocity) < NOTHING, "velocity of {kind:?}");
+        assert!(apart(&all.acceleration, &alone.acceleration) < NOTHING, "acceleration of {kind:?}");
     }
+}
+
+fn forces_lie_in_the_pyramid(bench: &Bench, contacts: &ContactSet) {
+    /// N
+    const INSIDE: f64 = 1e-4;
+    let settings = bench.sut.settings().contact;
+    let weight = bench.model.mass() * 9.81;
+    for leg in Leg::ALL {
+        let force = bench.output.foot_force[leg.index()];
+        let most = settings.max_vertical * weight * contacts.share(leg);
+        assert!(force.z <= most + INSIDE && force.z >= (settings.min_vertical * weight).min(most) - INSIDE);
+        assert!(force.x.abs().max(force.y.abs()) <= settings.friction * force.z + INSIDE);
+    }
+}
+
+fn everything_is_within_limits(bench: &Bench) {
+    let (model, output) = (&bench.model, &bench.output);
+    for joint in 0..JOINTS {
+        assert!(output.torque[joint].abs() <= model.max_torque[joint]);
+        assert!(output.velocity[joint].abs() <= model.max_velocity[joint]);
+        assert!((model.lower[joint]..=model.upper[joint]).contains(&output.position[joint]));
+    }
+}
+
+/// Torques and forces make the acceleration that was asked for, but for what the forces cannot give.
+fn equations_of_motion_hold(bench: &Bench, tracked: &Tracked) {
+    let mut acceleration = forward_dynamics(bench);
+    for axis in 0..6 {
+        acceleration[axis] -= bench.output.torso_slack[axis];
+    }
+    let apart = (acceleration - tracked.acceleration).amax();
+    assert!(apart < 1e-7 * (1.0 + tracked.acceleration.amax()), "{apart}");
+}
+
+/// How often what was checked.
+#[derive(Debug, Default)]
+struct Checked {
+    priorities: u64,
+    motions: u64,
+    limited: u64,
+}
+
+fn unlimited(output: &WbcOutput) -> bool {
+    output.status.limited == 0 && output.status.grounded == 0 && output.status.acceleration_scale == 1.0
+}
+
+fn laws_hold_in(case: &Case, seed: u64) {
+    let mut random = Random(seed);
+    let mut bench = Bench::new(WbcSettings::default());
+    let mut dynamics = Dynamics::new();
+    let mut checked = Checked::default();
+    for _ in 0..STATES {
+        let state = situations::state(&mut random, &bench.model);
+        dynamics.update(&bench.model, &state);
+        let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
+        let contacts = situations::contacts(&mut random, &case.stance);
+        let higher = (random.share() * objectives.len() as f64) as usize;
+        let alone = bench.step(&state, &objectives[..higher], &contacts);
+        let tracked_alone = bench.sut.tracked();
+        let all = bench.step(&state, &objectives, &contacts);
+        let tracked = bench.sut.tracked();
+
+        assert_eq!(all.status.fault, None);
+        stance_feet_rest(&bench, &contacts, &tracked);
+        forces_lie_in_the_pyramid(&bench, &contacts);
+        everything_is_within_limits(&bench);
+        // A stopped joint goes before all objectives, and what scales accelerations down scales all of them.
+        if unlimited(&all) && unlimited(&alone) {
+            lower_objectives_disturb_nothing(&bench, &objectives[..higher], [&tracked, &tracked_alone]);
+            checked.priorities += 1;
+        }
+        if all.status.limited == 0 {
+            equations_of_motion_hold(&bench, &tracked);
+            checked.motions += 1;
+        }
+        checked.limited += u64::from(all.status.limited != 0);
+    }
+    println!("{}: {checked:?}", case.name);
+    assert!(checked.priorities > STATES / 20 && checked.motions > STATES / 10, "{checked:?}");
+}
+
+/// A test for each mode, so that they run side by side.
+macro_rules! laws_hold {
+    ($($name:ident: $index:literal;)*) => {
+        $(#[test]
+        fn $name() {
+            laws_hold_in(&situations::cases()[$index], $index);
+        })*
+
+        #[test]
+        fn every_mode_is_tested() {
+            assert_eq!([$($index),*].len(), situations::cases().len());
+        }
+    };
+}
+
+laws_hold! {
+    laws_hold_in_stance: 0;
+    laws_hold_on_the_right_foot: 1;
+    laws_hold_on_the_left_foot: 2;
+    laws_hold_on_the_right_gripper: 3;
+    laws_hold_on_the_left_gripper: 4;
+    laws_hold_in_one_half_of_a_trot: 5;
+    laws_hold_in_the_other_half_of_a_trot: 6;
 }
 
 #[test]

@@ -26,11 +26,24 @@ pub enum StepPart {
     Forces,
 }
 
+/// What the hierarchy asks of torso and joints: q̄ - q, dq̄ and ddq̄, before anything is cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracked {
+    /// q̄ - q: m and rad in the torso's frame, then rad.
+    pub step: Motion,
+    /// dq̄
+    pub velocity: Motion,
+    /// ddq̄
+    pub acceleration: Motion,
+}
+
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
     settings: WbcSettings,
     dynamics: Dynamics,
     tracking: Tracking,
+    /// ddq̄ of the last step.
+    acceleration: Motion,
     forces: ForceDistribution,
     failures: u64,
     failures_in_a_row: u32,
@@ -43,6 +56,7 @@ impl WholeBodyController {
             settings,
             dynamics: Dynamics::new(),
             tracking: Tracking::new(),
+            acceleration: Motion::zeros(),
             forces: ForceDistribution::new(settings.contact),
             failures: 0,
             failures_in_a_row: 0,
@@ -57,6 +71,15 @@ impl WholeBodyController {
     /// Kinematics and dynamics at the state of the last step.
     pub fn dynamics(&self) -> &Dynamics {
         &self.dynamics
+    }
+
+    /// What the hierarchy asked for in the last step.
+    pub fn tracked(&self) -> Tracked {
+        Tracked {
+            step: self.tracking.position_step(),
+            velocity: self.tracking.velocity(),
+            acceleration: self.acceleration,
+        }
     }
 
     /// The contact-force problem of the last step.
@@ -107,6 +130,7 @@ impl WholeBodyController {
         self.dynamics.update(model, state);
         done(StepPart::Dynamics);
         let acceleration = self.track(model, state, objectives, contacts, &mut status);
+        self.acceleration = acceleration;
         done(StepPart::Hierarchy);
         let reaction = self.forces.solve(model, &self.dynamics, contacts, &acceleration);
         done(StepPart::Forces);

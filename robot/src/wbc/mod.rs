@@ -23,7 +23,7 @@ mod task;
 mod tracking;
 
 pub use contact::ContactSet;
-pub use controller::{StepPart, WholeBodyController};
+pub use controller::{StepPart, Tracked, WholeBodyController};
 pub use objective::{Objective, ObjectiveKind, PointReference, RotationReference};
 pub use output::WbcOutput;
 pub use settings::{ContactForceSettings, Gains, ObjectiveGains, SettingsError, WbcSettings};

@@ -114,7 +114,7 @@ impl ForceProblem {
             };
         }
         let row = index - self.foot_rows();
-        if row % 2 == 0 { self.torque.lower[row / 2] } else { -self.torque.upper[row / 2] }
+        if row.is_multiple_of(2) { self.torque.lower[row / 2] } else { -self.torque.upper[row / 2] }
     }
 
     /// n of a constraint.
@@ -135,7 +135,7 @@ impl ForceProblem {
             return normal;
         }
         let row = index - self.foot_rows();
-        let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if row.is_multiple_of(2) { 1.0 } else { -1.0 };
         for (entry, from) in normal.iter_mut().zip(&self.torque.from_forces[row / 2][..self.unknowns()]) {
             *entry = sign * from;
         }
