@@ -56,6 +56,7 @@ pub mod geometry;
 pub mod keys;
 pub mod link;
 pub mod messages;
+pub mod pace;
 pub mod realtime;
 pub mod recording;
 pub mod sequence;

@@ -1,4 +1,4 @@
-//! Lets a thread with a deadline run before those without.
+//! Lets a thread with a deadline run before those without, and never wait for a page of memory.
 
 /// Priority within `SCHED_FIFO` (1 to 99): above ordinary threads, below the kernel's own (50).
 const PRIORITY: libc::c_int = 20;
@@ -17,11 +17,27 @@ pub fn run_before_others() -> bool {
     }
 }
 
+/// Keeps all of the process's memory, now and later, in the machine's: a thread with a deadline never waits
+/// for a page. Tells whether the system agreed: it does for root, or without a limit on locked memory
+/// (`ulimit -l unlimited`).
+///
+/// Not asked for under a finite limit: what is allocated beyond it later would fail.
+pub fn lock_memory() -> bool {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: the pointer is to a live, exclusively borrowed rlimit; geteuid and mlockall take no pointers.
+    unsafe {
+        libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit);
+        (limit.rlim_cur == libc::RLIM_INFINITY || libc::geteuid() == 0)
+            && libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #[test]
     fn asking_never_fails_hard() {
         // Granted or not is the system's affair; the thread goes on either way.
         let _granted = super::run_before_others();
+        let _granted = super::lock_memory();
     }
 }

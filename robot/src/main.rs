@@ -116,6 +116,11 @@ fn control(config: RobotConfig, args: &RunArgs) -> anyhow::Result<()> {
             "no real-time priority (it takes root or an rtprio limit); a busy machine will be felt"
         );
     }
+    if !realtime::lock_memory() {
+        tracing::info!(
+            "memory not locked (it takes root or `ulimit -l unlimited`); a page may be waited for"
+        );
+    }
     tracing::info!(listen = ?args.listen, sim = %args.sim, "control loop runs; Ctrl-C lies down and ends");
     run(plant.as_mut(), &mut controller, &mut inbox, &mut outbox, || {
         match interrupts.load(Ordering::Relaxed) {
@@ -141,6 +146,10 @@ fn count_interrupts() -> anyhow::Result<Arc<AtomicU8>> {
 fn check(config: &RobotConfig) -> anyhow::Result<()> {
     let model = &config.model;
     tracing::info!("model: {} joints, {:.3} kg", model.joints.len(), model.mass());
+    let granted =
+        |granted: bool| if granted { "granted" } else { "refused, see `ulimit -r` and `ulimit -l`" };
+    tracing::info!("real-time priority: {}", granted(realtime::run_before_others()));
+    tracing::info!("memory locked: {}", granted(realtime::lock_memory()));
     tracing::info!("configuration: wbc.toml, control.toml, limits.toml, supervisor.toml are in order");
     Ok(())
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Event, OperatorCommand, RobotState};
+use locoman_protocol::pace::Pace;
 use locoman_protocol::{Received, Sender, realtime};
 
 use crate::board::{Board, PilotStatus};
@@ -31,9 +31,9 @@ pub struct Senders {
 /// Runs until the board says stop; ends with one command that says "hold".
 pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Senders, tap: &Tap) {
     realtime::run_before_others();
-    let period = Duration::from_secs_f64(1.0 / config.command.rate_hz);
+    let period_ns = (1e9 / config.command.rate_hz) as u64;
     let silent_ns = config.command.browser_silent_ms * 1_000_000;
-    let mut due = Instant::now();
+    let mut pace = Pace::new(period_ns);
     let mut sent_capture_ns = 0;
     while !board.stopping() {
         let now_ns = monotonic_ns();
@@ -61,12 +61,7 @@ pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Sender
             }
             board.happened(note);
         }
-        due += period;
-        match due.checked_duration_since(Instant::now()) {
-            Some(wait) => std::thread::sleep(wait),
-            // Late: go on from here, commands are not made up for.
-            None => due = Instant::now(),
-        }
+        pace.wait();
     }
     let (hold, _) = Pilot::new(config.clone(), None).step(monotonic_ns(), &Inputs::default());
     send(&mut senders, hold, 0, board, tap, &pilot);

@@ -15,14 +15,13 @@ use std::{
         atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering},
     },
     thread::JoinHandle,
-    time::Duration,
 };
 
 pub use admission::{Admission, Ruling};
 use locoman_protocol::{
     Endpoints, Link, LinkError, Received, Subscription,
-    clock::monotonic_ns,
     messages::{self, OperatorCommand, RobotState},
+    pace::Pace,
 };
 pub use state::message;
 use triple_buffer::{Input, Output, TripleBuffer};
@@ -172,7 +171,7 @@ fn publish_states(
     let thread = move || {
         // The session lives as long as this thread.
         let _link = link;
-        let mut next_ns = monotonic_ns();
+        let mut pace = Pace::new(STATE_PERIOD_NS);
         while !ended.load(Ordering::Relaxed) {
             if let Some(snapshot) = slot.read() {
                 let accepted = counts.accepted.load(Ordering::Relaxed);
@@ -181,9 +180,7 @@ fn publish_states(
                     tracing::debug!(%error, "state not sent");
                 }
             }
-            let now_ns = monotonic_ns();
-            next_ns = (next_ns + STATE_PERIOD_NS).max(now_ns);
-            std::thread::sleep(Duration::from_nanos(next_ns - now_ns));
+            pace.wait();
         }
     };
     std::thread::Builder::new()

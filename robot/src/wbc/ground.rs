@@ -102,8 +102,8 @@ impl ForceDistribution {
             Ok(source) => return (source, false),
             Err(failure) => failure,
         };
-        // Only the torque limits can leave no forces.
-        if failure == ForceFailure::Infeasible {
+        // There are always forces within the pyramids: what leaves none, or none to be found, is the torques.
+        if self.problem.torque.joints > 0 {
             let limits = std::mem::replace(&mut self.problem.torque.joints, 0);
             let found = self.try_both(forces);
             self.problem.torque.joints = limits;

@@ -9,7 +9,7 @@ use anyhow::ensure;
 use locoman_robot::commander::Command;
 use locoman_robot::control::{Controller, Inputs, Options as ControlOptions, RobotConfig, Snapshot};
 use locoman_robot::modes::Mode;
-use locoman_robot::plant::{JointCommand, Plant};
+use locoman_robot::plant::{JointCommand, Plant, Sensors};
 use locoman_robot::trajectory::Trajectory;
 
 use crate::robot::{EXCHANGE_S, LockstepPlant, Options, Truth};
@@ -24,6 +24,7 @@ pub struct Lockstep {
     plant: LockstepPlant,
     controller: Controller,
     command: JointCommand,
+    sensors: Option<Sensors>,
     operator: Command,
     truth: Truth,
     ticks: u64,
@@ -54,7 +55,7 @@ impl Lockstep {
             trajectory: None,
         };
         let (command, truth) = (*controller.command(), plant.truth());
-        Ok(Self { plant, controller, command, operator, truth, ticks: 0, silent: false })
+        Ok(Self { plant, controller, command, sensors: None, operator, truth, ticks: 0, silent: false })
     }
 
     /// One control step.
@@ -66,6 +67,7 @@ impl Lockstep {
             self.operator.received_ns = sensors.time_ns;
         }
         self.ticks += 1;
+        self.sensors = Some(sensors);
         let inputs = Inputs { command: Some(self.operator), ..Inputs::default() };
         self.command = self.controller.tick(sensors.time_ns, &sensors, &inputs);
         self.truth = self.plant.truth();
@@ -137,6 +139,16 @@ impl Lockstep {
     /// The controller.
     pub fn controller(&self) -> &Controller {
         &self.controller
+    }
+
+    /// What the robot measured last.
+    pub fn sensors(&self) -> Option<&Sensors> {
+        self.sensors.as_ref()
+    }
+
+    /// The controller, out of the simulation.
+    pub fn into_controller(self) -> Controller {
+        self.controller
     }
 
     /// The last command to the joints.

@@ -5,6 +5,7 @@
 pub mod demo;
 pub mod drive;
 pub mod lockstep;
+pub mod punctuality;
 pub mod report;
 pub mod statistics;
 pub mod tracking;
@@ -29,7 +30,7 @@ pub struct Args {
 }
 
 /// The experiments.
-#[derive(Debug, Clone, PartialEq, Eq, clap::Subcommand)]
+#[derive(Debug, Clone, PartialEq, clap::Subcommand)]
 pub enum Experiment {
     /// Poses from rendered images against the truth.
     Vision,
@@ -39,6 +40,8 @@ pub enum Experiment {
         #[arg(long, value_name = "SESSION")]
         recording: PathBuf,
     },
+    /// How punctually a real-time loop with the controller in it wakes up on this machine.
+    Loop(punctuality::Args),
     /// The paper's tracking tasks and its square, against the estimator and against the truth.
     Tracking(tracking::Args),
 }
@@ -49,6 +52,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let report = match &args.experiment {
         Experiment::Vision => vision::run(configs, args.seed, plot.as_deref())?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
+        Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,
     };
     report.finish(args.json.as_deref())

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use locoman_protocol::messages::SimTruth;
+use locoman_protocol::pace::Pace;
 use locoman_protocol::{Link, LinkError, geometry};
 use nalgebra::Isometry3;
 use triple_buffer::Output;
@@ -11,7 +12,7 @@ use triple_buffer::Output;
 use super::server::Counters;
 use super::world::Truth;
 
-const PERIOD: Duration = Duration::from_millis(10);
+const PERIOD_NS: u64 = 10_000_000;
 const REPORT_PERIOD: Duration = Duration::from_secs(5);
 /// Fewer late exchanges in a report's period (of 2000) are not worth a line.
 const LATE_WORTH_TELLING: u64 = 20;
@@ -25,7 +26,7 @@ pub fn publish(
 ) -> Result<(), LinkError> {
     let mut sender = link.sender::<SimTruth>()?;
     let mut last_ns = 0;
-    let mut next = Instant::now();
+    let mut pace = Pace::new(PERIOD_NS);
     let mut report = Report::new();
     while !stop.load(Ordering::Relaxed) {
         if let Some(truth) = truth.read().as_ref().filter(|truth| truth.time_ns != last_ns) {
@@ -33,8 +34,7 @@ pub fn publish(
             sender.send(truth.time_ns, message(truth))?;
         }
         report.tell(counters);
-        next = (next + PERIOD).max(Instant::now());
-        std::thread::sleep(next.saturating_duration_since(Instant::now()));
+        pace.wait();
     }
     Ok(())
 }
