@@ -116,7 +116,7 @@ impl Met {
 }
 
 #[test]
-fn both_solvers_agree_on_recorded_problems() {
+fn both_solvers_agree_on_100_000_recorded_problems() {
     const PROBLEMS: u32 = 100_000;
     let (nominal, cases) = (situations::model(), situations::cases());
     let mut model = nominal.clone();

@@ -9,8 +9,8 @@ use locoman_robot::{
     joints::{JOINTS, JointVector, Leg, Side},
     model::{Frame, Model},
     wbc::{
-        ContactSet, ForceSource, Objective, PointReference, RotationReference, Tracked, WbcFault, WbcOutput,
-        WbcSettings, WholeBodyController,
+        ContactSet, ForceFailure, ForceSource, Objective, PointReference, RotationReference, Tracked,
+        WbcFault, WbcOutput, WbcSettings, WholeBodyController,
     },
 };
 use nalgebra::{UnitQuaternion, Vector3};
@@ -267,4 +267,86 @@ fn without_contact_there_are_no_forces() {
     assert_eq!(output.status.forces, ForceSource::NoContact);
     assert!(output.foot_force.iter().all(|force| force.norm() == 0.0));
     assert!(output.is_finite());
+}
+
+#[test]
+fn three_steps_in_a_row_without_forces_are_a_fault_and_the_command_stays_safe() {
+    let mut settings = WbcSettings::default();
+    settings.contact.slack_weight[0] = f64::INFINITY;
+    let mut bench = Bench::new(settings);
+    let state = State::at_rest(stand());
+    for step in 1..=4 {
+        let output = bench.step(&state, &[], &ContactSet::STANCE);
+        assert_eq!(output.status.forces, ForceSource::LastFeasible(ForceFailure::NotFinite));
+        assert_eq!(output.status.force_failures, step);
+        let fault = (step >= 3).then_some(WbcFault::Forces(ForceFailure::NotFinite));
+        assert_eq!(output.status.fault, fault);
+        assert!(output.is_finite());
+        everything_is_within_limits(&bench);
+    }
+}
+
+/// A target with its point moved by so much.
+fn moved(objective: &Objective, by: Vector3<f64>) -> Objective {
+    let mut moved = *objective;
+    match &mut moved {
+        Objective::TorsoPosition(reference)
+        | Objective::FootPosition(_, reference)
+        | Objective::GripperPosition(_, reference)
+        | Objective::ArmPosture(_, reference) => reference.position += by,
+        Objective::TorsoOrientation(reference) | Objective::GripperOrientation(_, reference) => {
+            reference.orientation = UnitQuaternion::from_scaled_axis(10.0 * by) * reference.orientation;
+        }
+    }
+    moved
+}
+
+/// The greatest difference of two commands: rad, rad/s, and shares of the greatest torques.
+fn apart(model: &Model, one: &WbcOutput, other: &WbcOutput) -> f64 {
+    let torque = (one.torque - other.torque).component_div(&model.max_torque);
+    (one.position - other.position).amax().max((one.velocity - other.velocity).amax()).max(torque.amax())
+}
+
+/// But where a joint or a limb is stopped: from being stopped on it has no velocity of its own.
+#[test]
+fn the_command_is_continuous_where_a_target_is() {
+    const WAYS: usize = 1000;
+    /// Halvings of a way of 20 mm or 0.2 rad; what is left of it is nothing.
+    const HALVINGS: usize = 30;
+    let cases = situations::cases();
+    let mut random = Random(11);
+    let mut bench = Bench::new(WbcSettings::default());
+    let mut dynamics = Dynamics::new();
+    let mut jumps_at_stops = 0;
+    for way in 0..WAYS * cases.len() {
+        let case = &cases[way % cases.len()];
+        let state = situations::state(&mut random, &bench.model);
+        dynamics.update(&bench.model, &state);
+        let mut objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
+        let contacts = situations::contacts(&mut random, &case.stance);
+        let index = (random.share() * objectives.len() as f64) as usize;
+        let (target, direction) = (objectives[index], random.vector(0.02));
+        let mut at = |bench: &mut Bench, share: f64| {
+            objectives[index] = moved(&target, direction * share);
+            bench.step(&state, &objectives, &contacts)
+        };
+        // Into the half with the greater difference, again and again: a jump is left in the end.
+        let (mut begin, mut end) = (0.0, 1.0);
+        let (mut first, mut last) = (at(&mut bench, begin), at(&mut bench, end));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (begin + end);
+            let between = at(&mut bench, middle);
+            if apart(&bench.model, &first, &between) > apart(&bench.model, &between, &last) {
+                (end, last) = (middle, between);
+            } else {
+                (begin, first) = (middle, between);
+            }
+        }
+        if apart(&bench.model, &first, &last) > 1e-4 {
+            let free = |output: &WbcOutput| output.status.limited == 0 && output.status.grounded == 0;
+            assert!(!free(&first) || !free(&last), "{}: {:?}", case.name, objectives[index].kind());
+            jumps_at_stops += 1;
+        }
+    }
+    println!("{jumps_at_stops} of {} ways end in a jump where something stops", WAYS * cases.len());
 }

@@ -240,3 +240,37 @@ impl ForceSource {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{dynamics::State, joints::JointVector, wbc::WbcSettings};
+
+    #[test]
+    fn when_no_solver_finds_forces_the_last_ones_serve_within_their_present_limits() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot");
+        let model = Model::load(&folder).unwrap();
+        let mut position = JointVector::zeros();
+        for leg in Leg::ALL {
+            position.fixed_rows_mut::<3>(leg.first_joint()).copy_from_slice(&[0.0, 0.9, -1.8]);
+        }
+        let mut dynamics = Dynamics::new();
+        dynamics.update(&model, &State::at_rest(position));
+        let mut sut = ForceDistribution::new(WbcSettings::default().contact);
+        let contacts = ContactSet::STANCE;
+        let good = sut.solve(&model, &dynamics, &contacts, &Motion::zeros()).unwrap();
+        assert_eq!(good.source, ForceSource::ActiveSet);
+
+        sut.settings.slack_weight[2] = f64::INFINITY;
+        let lifting = contacts.with_share(Leg::RearLeft, 0.1);
+        let bad = sut.solve(&model, &dynamics, &lifting, &Motion::zeros()).unwrap();
+        assert_eq!(bad.source, ForceSource::LastFeasible(ForceFailure::NotFinite));
+        for leg in [Leg::FrontRight, Leg::FrontLeft, Leg::RearRight] {
+            assert!((bad.force[leg.index()] - good.force[leg.index()]).amax() < 1e-9);
+        }
+        let most = 0.1 * sut.settings.max_vertical * model.mass() * GRAVITY;
+        let limited = bad.force[Leg::RearLeft.index()];
+        assert!((limited.z - most).abs() < 1e-9 && good.force[Leg::RearLeft.index()].z > most);
+        assert!(limited.x.abs().max(limited.y.abs()) <= sut.settings.friction * most + 1e-9);
+    }
+}

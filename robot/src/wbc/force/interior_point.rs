@@ -13,12 +13,16 @@ use clarabel::{
 
 use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES};
 
-/// Of the duality gap. A gap ε leaves the forces uncertain by √(2ε / Q_1), for they are nearly free where
-/// only Q_1 weighs them: at 1e-13, 0.02 N at worst and far less in practice (at the usual 1e-8, newtons).
-const GAP_TOLERANCE: f64 = 1e-13;
+/// What the cost is multiplied with: its entries are then about 1, where Clarabel starts from, which saves it
+/// a quarter of its iterations.
+const COST_SCALE: f64 = 100.0;
+/// Of the duality gap of the scaled cost. A gap ε leaves the forces uncertain by √(2ε / Q_1), for they are
+/// nearly free where only Q_1 weighs them: at 1e-12, 0.006 N at worst and far less in practice (at the usual
+/// 1e-8 and without scaling, newtons).
+const GAP_TOLERANCE: f64 = 1e-12;
 /// Of the constraints, in body weights.
 const FEASIBILITY: f64 = 1e-8;
-/// A dozen is the rule.
+/// Eight to ten are the rule.
 const MAX_ITERATIONS: u32 = 50;
 
 /// The interior-point method, ready for one to four feet.
@@ -107,6 +111,9 @@ impl Prepared {
             input_sparse_dropzeros: false,
             // The problem comes scaled, and a scaling of the setup's numbers would not fit later ones.
             equilibrate_enable: false,
+            // Refinement takes two fifths of a solve and gains nothing here: with it, more of the problems with
+            // hardly any room for torques end short of the tolerance.
+            iterative_refinement_enable: false,
             ..DefaultSettings::default()
         };
         let (hessian_entries, bounds) = (hessian.2.len(), vec![1.0; pattern.rows()]);
@@ -135,9 +142,11 @@ impl Prepared {
         let n = problem.unknowns();
         let upper = (0..n).flat_map(|column| (0..=column).map(move |row| (row, column)));
         for (entry, (row, column)) in self.hessian.iter_mut().zip(upper) {
-            *entry = problem.hessian[row][column];
+            *entry = COST_SCALE * problem.hessian[row][column];
         }
-        self.gradient.copy_from_slice(&problem.gradient[..n]);
+        for (entry, gradient) in self.gradient.iter_mut().zip(&problem.gradient) {
+            *entry = COST_SCALE * gradient;
+        }
         // Clarabel's rows are -W f + s = -bound with s >= 0.
         for (index, bound) in self.bounds.iter_mut().enumerate() {
             *bound = -problem.bound(index);
