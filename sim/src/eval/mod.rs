@@ -2,11 +2,13 @@
 //!
 //! To add one: a module with `run`, and a variant of [`Experiment`].
 
+pub mod body;
 pub mod demo;
 pub mod drive;
 pub mod lockstep;
 pub mod punctuality;
 pub mod report;
+pub mod robustness;
 pub mod statistics;
 pub mod tracking;
 pub mod vision;
@@ -44,6 +46,8 @@ pub enum Experiment {
     Loop(punctuality::Args),
     /// The paper's tracking tasks and its square, against the estimator and against the truth.
     Tracking(tracking::Args),
+    /// Unreachable and singular targets, pushes, loads, slippery feet, lost commands: does it fall or shake?
+    Robustness(robustness::Args),
 }
 
 /// Runs `locoman-sim eval`.
@@ -53,6 +57,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Vision => vision::run(configs, args.seed, plot.as_deref())?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
+        Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,
     };
     report.finish(args.json.as_deref())

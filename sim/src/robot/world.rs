@@ -222,6 +222,20 @@ impl World {
         force
     }
 
+    /// Contacts that no plan has: of arms with the trunk or each other, and of anything but feet with the ground.
+    pub fn unplanned_contacts(&self) -> [usize; 2] {
+        let mut count = [0; 2];
+        for contact in self.data.contact().iter().filter(|contact| contact.dist < 0.0) {
+            let is_foot = |geom: i32| self.foot_of_geom.get(address(geom)).copied().flatten().is_some();
+            if !contact.geom.contains(&self.ground) {
+                count[0] += 1;
+            } else if !contact.geom.into_iter().any(is_foot) {
+                count[1] += 1;
+            }
+        }
+        count
+    }
+
     /// Whether the trunk touches the ground or is tilted beyond 60 degrees.
     pub fn fallen(&self) -> bool {
         const COS_60_DEG: f64 = 0.5;

@@ -7,14 +7,13 @@
 
 use std::path::Path;
 
-use locoman_robot::dynamics::Dynamics;
-use locoman_robot::model::Frame;
 use locoman_robot::trajectory::Trajectory;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
-use super::task::{Body, Task};
+use super::task::Task;
+use crate::eval::body::{Body, align};
 use crate::eval::lockstep::{Lockstep, ticks};
-use crate::robot::{EXCHANGE_S, Options, Truth};
+use crate::robot::{EXCHANGE_S, Options};
 
 /// Rest in the mode before the motion, and the part of it by which worlds are aligned, s.
 const REST_S: f64 = 1.0;
@@ -68,7 +67,7 @@ pub fn measure(
     let mut sut = Lockstep::new(configs, &options)?;
     sut.go_to(task.mode(side))?;
     sut.run(REST_S - ALIGN_S)?;
-    let sim_from_world = align(&mut sut)?;
+    let sim_from_world = align(&mut sut, ALIGN_S)?;
 
     let bodies = [Some(Body::Torso), task.limb(side)];
     let anchors = bodies.map(|body| body.map(|body| body.reference(&sut)));
@@ -86,10 +85,7 @@ pub fn measure(
         for (place, body) in bodies.iter().enumerate() {
             let (Some(body), Some(anchor)) = (body, &anchors[place]) else { continue };
             let desired = displacements[place].displacing(anchor).pose();
-            let mut true_pose = sim_from_world.inv_mul(&body.truth(sut.truth()));
-            if let Body::Foot(_) = body {
-                true_pose = point(true_pose.translation.vector);
-            }
+            let true_pose = body.truth(sut.truth(), &sim_from_world);
             let errors = &mut errors[place];
             errors.reference.push(&desired, &body.reference(&sut));
             errors.estimate.push(&desired, &body.estimate(sut.controller().wbc().dynamics()));
@@ -100,59 +96,6 @@ pub fn measure(
     let [torso, limb] = errors;
     let limb = bodies[1].map(|_| limb);
     Ok(Run { task, profile: profile.into(), torso, limb })
-}
-
-/// The simulator's pose of the robot's world, by the torso at rest.
-fn align(sut: &mut Lockstep) -> anyhow::Result<Isometry3<f64>> {
-    let mut mean: Option<(Isometry3<f64>, Vector3<f64>, Vector3<f64>)> = None;
-    let count = ticks(ALIGN_S);
-    for _ in 0..count {
-        sut.tick()?;
-        let estimate = Body::Torso.estimate(sut.controller().wbc().dynamics());
-        let now = sut.truth().world_from_torso * estimate.inverse();
-        let (first, moved, turned) = mean.get_or_insert((now, Vector3::zeros(), Vector3::zeros()));
-        *moved += (now.translation.vector - first.translation.vector) / count as f64;
-        *turned += (now.rotation * first.rotation.inverse()).scaled_axis() / count as f64;
-    }
-    let (first, moved, turned) = mean.unwrap_or_default();
-    Ok(Isometry3::from_parts(
-        (first.translation.vector + moved).into(),
-        UnitQuaternion::from_scaled_axis(turned) * first.rotation,
-    ))
-}
-
-impl Body {
-    fn estimate(self, dynamics: &Dynamics) -> Isometry3<f64> {
-        let frame = match self {
-            Self::Torso => Frame::Torso,
-            Self::Gripper(side) => Frame::Gripper(side),
-            Self::Foot(side) => {
-                return point(dynamics.frame(Frame::Foot(side.leg())).world_from_frame.translation.vector);
-            }
-        };
-        dynamics.frame(frame).world_from_frame
-    }
-
-    fn truth(self, truth: &Truth) -> Isometry3<f64> {
-        match self {
-            Self::Torso => truth.world_from_torso,
-            Self::Gripper(side) => truth.world_from_gripper[side.index()],
-            Self::Foot(side) => point(truth.feet_in_world[side.leg().index()].coords),
-        }
-    }
-
-    fn reference(self, sut: &Lockstep) -> Isometry3<f64> {
-        match self {
-            Self::Torso => sut.snapshot().torso.target,
-            Self::Gripper(side) => sut.snapshot().grippers[side.index()].target,
-            Self::Foot(side) => sut.snapshot().feet[side.index()].target,
-        }
-    }
-}
-
-/// A body without orientation.
-fn point(position: Vector3<f64>) -> Isometry3<f64> {
-    Isometry3::from_parts(position.into(), UnitQuaternion::identity())
 }
 
 impl Series {

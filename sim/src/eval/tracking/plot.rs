@@ -9,7 +9,8 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::measure::{BodyErrors, Run};
-use super::task::{Body, Task};
+use super::task::Task;
+use crate::eval::body::Body;
 use crate::robot::EXCHANGE_S;
 
 const SIZE_PX: (u32, u32) = (1200, 1260);

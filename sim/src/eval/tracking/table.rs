@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use locoman_robot::joints::Side;
 
 use super::measure::{BodyErrors, Run, Series};
-use super::task::{Body, Bounds, PoseBounds, Task};
+use super::task::{Bounds, PoseBounds, Task};
+use crate::eval::body::Body;
 use crate::eval::statistics::mean;
 use crate::eval::{Figure, Must, Report};
 

@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::eval::body::Body;
+
 /// Poses of a random trajectory, and the time from each to the next, s: 3200 targets at 400 Hz.
 const POSES: usize = 4;
 const POSE_S: f64 = 2.0;
@@ -27,28 +29,6 @@ pub enum Task {
     StandingTorsoMoving,
     /// The gripper draws a rectangle in space while the torso leans in.
     Square,
-}
-
-/// A body of the robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Body {
-    /// Trunk.
-    Torso,
-    /// Gripper of a side.
-    Gripper(Side),
-    /// Front foot of a side: a point.
-    Foot(Side),
-}
-
-impl Body {
-    /// In figures.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Torso => "torso",
-            Self::Gripper(_) => "gripper",
-            Self::Foot(_) => "foot",
-        }
-    }
 }
 
 /// Largest displacement of a random pose on each axis.
