@@ -2,12 +2,72 @@
 //!
 //! [`crate::dynamics`] computes the same in the world, with everything else; the estimator needs this before.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::{
-    joints::{JointVector, Leg, Side},
+    joints::{JOINTS, JointVector, Leg, Side},
     model::{Frame, Model, PARENT},
 };
+
+/// Where the bodies are, in the torso's frame.
+pub trait Bodies {
+    /// Orientation and origin of the body that moves with a joint.
+    fn pose(&self, joint: usize) -> (&Matrix3<f64>, &Vector3<f64>);
+
+    /// Axis of the joint.
+    fn axis(&self, joint: usize) -> &Vector3<f64>;
+}
+
+/// A body that moves with a joint, in the torso's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    rotation: Matrix3<f64>,
+    origin: Vector3<f64>,
+    axis: Vector3<f64>,
+}
+
+/// All bodies in one posture.
+pub type BodyPoses = [Body; JOINTS];
+
+/// Where all bodies are in a posture.
+pub fn body_poses(model: &Model, position: &JointVector) -> BodyPoses {
+    let home = Body { rotation: Matrix3::identity(), origin: Vector3::zeros(), axis: Vector3::zeros() };
+    let mut bodies = [home; JOINTS];
+    for joint in 0..JOINTS {
+        let parent = PARENT[joint].map_or(&home, |parent| &bodies[parent]);
+        bodies[joint] = next_body(model, position, joint, &parent.rotation, &parent.origin);
+    }
+    bodies
+}
+
+/// The body that a joint turns, on a parent that is placed.
+fn next_body(
+    model: &Model,
+    position: &JointVector,
+    joint: usize,
+    rotation: &Matrix3<f64>,
+    origin: &Vector3<f64>,
+) -> Body {
+    let own = &model.joints[joint];
+    let placement = &own.parent_from_joint;
+    let torso_from_joint = rotation * placement.rotation.to_rotation_matrix().matrix();
+    let turn = Rotation3::from_axis_angle(&own.axis, position[joint]);
+    Body {
+        rotation: torso_from_joint * turn.matrix(),
+        origin: rotation * placement.translation.vector + origin,
+        axis: torso_from_joint * own.axis.into_inner(),
+    }
+}
+
+impl Bodies for BodyPoses {
+    fn pose(&self, joint: usize) -> (&Matrix3<f64>, &Vector3<f64>) {
+        (&self[joint].rotation, &self[joint].origin)
+    }
+
+    fn axis(&self, joint: usize) -> &Vector3<f64> {
+        &self[joint].axis
+    }
+}
 
 /// Pose of the body that moves with a joint, in the torso's frame.
 fn torso_from_body(model: &Model, position: &JointVector, joint: usize) -> Isometry3<f64> {
@@ -110,15 +170,23 @@ impl GripperKinematics {
     pub fn new(model: &Model, position: &JointVector, side: Side) -> Self {
         let (leg, arm) = (side.leg().first_joint(), side.first_arm_joint());
         let joints = [leg, leg + 1, leg + 2, arm, arm + 1, arm + 2];
-        let torso_from_gripper = torso_from_frame(model, position, Frame::Gripper(side));
-        let gripper = torso_from_gripper.translation.vector;
-        let mut jacobian = Matrix6::zeros();
+        let (mut rotation, mut origin) = (Matrix3::identity(), Vector3::zeros());
+        let (mut axes, mut origins) = ([Vector3::zeros(); 6], [Vector3::zeros(); 6]);
         for (column, joint) in joints.into_iter().enumerate() {
-            let body = torso_from_body(model, position, joint);
-            let axis = body.rotation * model.joints[joint].axis.into_inner();
-            let linear = axis.cross(&(gripper - body.translation.vector));
+            let body = next_body(model, position, joint, &rotation, &origin);
+            (rotation, origin) = (body.rotation, body.origin);
+            (axes[column], origins[column]) = (body.axis, body.origin);
+        }
+        let torso_from_hand = Isometry3::from_parts(
+            origin.into(),
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation)),
+        );
+        let torso_from_gripper = torso_from_hand * model.hand_from_gripper(side);
+        let mut jacobian = Matrix6::zeros();
+        for column in 0..6 {
+            let linear = axes[column].cross(&(torso_from_gripper.translation.vector - origins[column]));
             jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
-            jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
+            jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axes[column]);
         }
         Self { torso_from_gripper, jacobian, joints }
     }

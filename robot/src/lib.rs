@@ -6,6 +6,7 @@
 //! link ──────────────────────┴──────────┴──────────┘
 //! ```
 
+pub mod collision;
 pub mod commander;
 pub mod control;
 pub mod dynamics;
@@ -16,6 +17,7 @@ pub mod link;
 pub mod model;
 pub mod modes;
 pub mod plant;
+mod polyhedron;
 pub mod supervisor;
 pub mod trajectory;
 pub mod wbc;

@@ -146,6 +146,30 @@ fn an_inertia_that_is_none_is_refused_with_its_link() {
 }
 
 #[test]
+fn an_inertia_that_is_not_positive_definite_is_refused_with_its_link() {
+    let expected = "`trunk`: has a principal moment of inertia that is not positive";
+    refused("flat", "iyy=\"0.063009565\"", "iyy=\"-0.063009565\"", expected);
+    refused("oblique", "iyz=\"-4.18731e-05\"", "iyz=\"0.08\"", expected);
+}
+
+#[test]
+fn numbers_that_are_none_are_refused_with_their_joint() {
+    let (from, to) = ("xyz=\"0.1881 -0.04675 0\"", "xyz=\"NaN -0.04675 0\"");
+    refused("nan", from, to, "`1_FR_hip_joint`: has a number that is not finite");
+}
+
+#[test]
+fn an_element_that_is_there_twice_is_refused() {
+    refused("twice", "\"3_RR_calf_joint\"", "\"3_RR_thigh_joint\"", "`3_RR_thigh_joint`: is there twice");
+    refused("link", "<link name=\"3_RR_hip\">", "<link name=\"3_RR_calf\">", "`3_RR_calf`: is there twice");
+}
+
+#[test]
+fn a_link_that_hangs_nowhere_is_refused() {
+    refused("nowhere", "<child link=\"3_RR_calf\"/>", "<child link=\"3_RR_calve\"/>", "3_RR_calf");
+}
+
+#[test]
 fn a_joint_without_a_range_is_refused() {
     let (from, to) = ("lower=\"-0.863\" upper=\"0.863\"", "lower=\"0.863\" upper=\"-0.863\"");
     refused("range", from, to, "1_FR_hip_joint");

@@ -146,7 +146,11 @@ struct Checked {
 }
 
 fn unlimited(output: &WbcOutput) -> bool {
-    output.status.limited == 0 && output.status.grounded == 0 && output.status.acceleration_scale == 1.0
+    let status = &output.status;
+    status.limited == 0
+        && status.grounded == 0
+        && status.kept_apart.is_none()
+        && status.acceleration_scale == 1.0
 }
 
 fn laws_hold_in(case: &Case, seed: u64) {

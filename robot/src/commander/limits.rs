@@ -107,6 +107,8 @@ pub struct ReachRange {
     pub calf: Range,
     /// The arm's first joint, rad; the others have the model's range.
     pub arm_1: Range,
+    /// Least distance of links, m.
+    pub clearance_m: f64,
 }
 
 /// Everything in `limits.toml`.
@@ -169,6 +171,7 @@ impl Default for Limits {
                 thigh: Range { min: -0.4, max: 2.2 },
                 calf: Range { min: -2.78, max: -0.95 },
                 arm_1: Range { min: -2.2, max: 1.7 },
+                clearance_m: 0.015,
             },
             stance_torso_rate: RateLimits {
                 speed_m_s: 0.3,

@@ -2,42 +2,65 @@
 //!
 //! The whole-body controller puts a gripper's position above its orientation: were the target out of reach,
 //! it would give up all of the orientation for the last millimetre. So a target is first replaced by the pose
-//! nearest to it that six joints inside their ranges can take, where both errors count:
-//! minimize |p_t - p(q)|² + L² |log(R_t R(q)ᵀ)|² over q in its box,
-//! by damped Gauss-Newton steps from the last solution, with joints at their limits held (an active set).
+//! nearest to it that six joints inside their ranges can take, off the robot itself, where both errors count:
+//!
+//! ```text
+//! minimize |p_t - p(q)|² + L² |log(R_t R(q)ᵀ)|²   over q in its box, links apart, |q̇| ≤ v
+//! ```
+//! by damped Gauss-Newton steps from the last solution, each brought to the nearest step that the limits permit
+//! ([`crate::polyhedron`]). With the joints' speed bounded, the solution is a path that the limb can follow.
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::limits::{Range, ReachRange};
 use crate::{
+    collision::Clearances,
     joints::{JointVector, Side},
-    kinematics::GripperKinematics,
+    kinematics::{GripperKinematics, body_poses},
     model::Model,
+    polyhedron::Polyhedron,
 };
 
 /// L: an error of a radian counts like this many metres. At the wrist's distance from the grasp centre.
 const METRES_PER_RADIAN: f64 = 0.15;
 /// Damping, m²/rad²: 1 % of what an arm's link of 0.1 m gives.
 const DAMPING: f64 = 1e-4;
-/// Longest step of a joint, rad.
-const MAX_STEP_RAD: f64 = 0.05;
+/// Share of the joints' greatest velocities at which the solution may move, and a limit for all, rad/s.
+const SPEED_SHARE: f64 = 0.5;
+const SPEED_RAD_S: f64 = 4.0;
 /// Distance kept from the ends of the joints' ranges, rad.
 const MARGIN_RAD: f64 = 0.03;
+/// Links nearer than this beyond their clearance are looked at, m.
+const INFLUENCE_M: f64 = 0.03;
 /// Steps in each control period: a reachable target is met to a hundredth of a millimetre.
 const STEPS: usize = 3;
 
 /// Leg and arm that reach for a target.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Reach {
     side: Side,
     joints: JointVector,
     range: ReachRange,
+    clearances: Clearances,
+    polyhedron: Polyhedron,
 }
+
+/// How a distance of two links depends on the six joints.
+#[derive(Debug, Clone, Copy)]
+struct Wall {
+    /// What is left of it, m.
+    room: f64,
+    /// m/rad
+    slope: Vector6<f64>,
+}
+
+/// The most that are looked at.
+const WALLS: usize = crate::collision::MOST_NEAR;
 
 impl Reach {
     /// Starts at these joint angles.
     pub fn new(side: Side, joints: &JointVector, range: ReachRange) -> Self {
-        Self { side, joints: *joints, range }
+        Self { side, joints: *joints, range, clearances: Clearances::new(), polyhedron: Polyhedron::new() }
     }
 
     fn range(&self, model: &Model, column: usize, joint: usize) -> Range {
@@ -50,15 +73,44 @@ impl Reach {
         }
     }
 
-    /// The nearest pose to `torso_from_target` that can be reached. Allocates nothing.
-    pub fn nearest(&mut self, model: &Model, torso_from_target: &Isometry3<f64>) -> Isometry3<f64> {
+    /// The nearest pose to `torso_from_target` that can be reached by now; the other limbs are at `others`.
+    /// Allocates nothing.
+    pub fn nearest(
+        &mut self,
+        model: &Model,
+        others: &JointVector,
+        torso_from_target: &Isometry3<f64>,
+        dt_s: f64,
+    ) -> Isometry3<f64> {
+        let now = GripperKinematics::new(model, &self.joints, self.side);
+        let mut posture = *others;
+        for joint in now.joints {
+            posture[joint] = self.joints[joint];
+        }
+        self.joints = posture;
+        let mut walls = [Wall { room: 0.0, slope: Vector6::zeros() }; WALLS];
+        let count = self.walls(model, &now.joints, &mut walls);
         for _ in 0..STEPS {
-            self.step(model, torso_from_target);
+            self.step(model, torso_from_target, &mut walls[..count], dt_s / STEPS as f64);
         }
         GripperKinematics::new(model, &self.joints, self.side).torso_from_gripper
     }
 
-    fn step(&mut self, model: &Model, target: &Isometry3<f64>) {
+    /// Finds the links that are near this limb's.
+    fn walls(&mut self, model: &Model, joints: &[usize; 6], walls: &mut [Wall; WALLS]) -> usize {
+        let bodies = body_poses(model, &self.joints);
+        let pairs = model.collision.pairs_of(self.side);
+        let clearance_m = self.range.clearance_m;
+        self.clearances.update(&model.collision, pairs, &bodies, clearance_m + INFLUENCE_M);
+        for (wall, near) in walls.iter_mut().zip(self.clearances.near()) {
+            let gradient = near.gradient(&bodies);
+            let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
+            *wall = Wall { room: near.distance - clearance_m, slope };
+        }
+        self.clearances.near().len()
+    }
+
+    fn step(&mut self, model: &Model, target: &Isometry3<f64>, walls: &mut [Wall], dt_s: f64) {
         let now = GripperKinematics::new(model, &self.joints, self.side);
         let mut error = Vector6::zeros();
         let moved = target.translation.vector - now.torso_from_gripper.translation.vector;
@@ -68,120 +120,35 @@ impl Reach {
         let mut jacobian = now.jacobian;
         jacobian.fixed_rows_mut::<3>(3).scale_mut(METRES_PER_RADIAN);
 
-        let gradient = jacobian.tr_mul(&error);
         let hessian = jacobian.tr_mul(&jacobian) + DAMPING * Matrix6::identity();
-        let mut held = [false; 6];
-        // Each round holds the joints that the last one pushed out of their range.
-        for _ in 0..6 {
-            let step = solve_free(&hessian, &gradient, &held);
-            let mut again = false;
-            for (column, joint) in now.joints.into_iter().enumerate() {
-                let range = self.range(model, column, joint);
-                let angle = self.joints[joint];
-                let leaves =
-                    (angle <= range.min && step[column] < 0.0) || (angle >= range.max && step[column] > 0.0);
-                if leaves && !held[column] {
-                    held[column] = true;
-                    again = true;
-                }
-            }
-            if !again {
-                let scale = (MAX_STEP_RAD / step.amax().max(MAX_STEP_RAD)).min(1.0);
-                for (column, joint) in now.joints.into_iter().enumerate() {
-                    let range = self.range(model, column, joint);
-                    let angle = self.joints[joint] + scale * step[column];
-                    self.joints[joint] = range.clamp(angle);
-                }
-                return;
-            }
+        let Some(factor) = hessian.cholesky() else { return };
+        let free = factor.solve(&jacobian.tr_mul(&error));
+        self.polyhedron.clear();
+        for (column, joint) in now.joints.into_iter().enumerate() {
+            let range = self.range(model, column, joint);
+            let most = dt_s * SPEED_RAD_S.min(SPEED_SHARE * model.max_velocity[joint]);
+            let angle = self.joints[joint];
+            let unit = Vector6::ith(column, 1.0);
+            self.polyhedron.push(unit, (range.min - angle).clamp(-most, most) - free[column]);
+            self.polyhedron.push(-unit, (angle - range.max).clamp(-most, most) + free[column]);
+        }
+        for wall in walls.iter() {
+            // Links that are too near are taken apart at half a metre a second.
+            self.polyhedron.push(wall.slope, (-wall.room).min(0.5 * dt_s) - wall.slope.dot(&free));
+        }
+        let change = if self.polyhedron.contains_zero() {
+            free
+        } else {
+            free + self.polyhedron.nearest(&hessian).unwrap_or(-free)
+        };
+        for (joint, change) in now.joints.into_iter().zip(change.iter()) {
+            self.joints[joint] += change;
+        }
+        for wall in walls {
+            wall.room += wall.slope.dot(&change);
         }
     }
-}
-
-/// H Δq = g over the joints that are not held; zero for those that are.
-fn solve_free(hessian: &Matrix6<f64>, gradient: &Vector6<f64>, held: &[bool; 6]) -> Vector6<f64> {
-    let (mut hessian, mut gradient) = (*hessian, *gradient);
-    for (index, _) in held.iter().enumerate().filter(|(_, held)| **held) {
-        hessian.row_mut(index).fill(0.0);
-        hessian.column_mut(index).fill(0.0);
-        hessian[(index, index)] = 1.0;
-        gradient[index] = 0.0;
-    }
-    hessian.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(&gradient))
 }
 
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use nalgebra::{UnitQuaternion, Vector3};
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::{commander::Limits, kinematics::torso_from_frame, model::Frame};
-
-    fn model() -> Model {
-        Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-    }
-
-    fn ready() -> JointVector {
-        let mut joints = JointVector::zeros();
-        joints.rows_mut(0, 3).copy_from_slice(&[-0.1, 0.9, -2.2]);
-        joints.rows_mut(12, 3).copy_from_slice(&[-0.4, 0.0, 0.0]);
-        joints
-    }
-
-    /// Walks the target from the start to `goal` in a second, then waits for another.
-    fn walk(sut: &mut Reach, model: &Model, start: &Isometry3<f64>, goal: &Isometry3<f64>) -> Isometry3<f64> {
-        let mut reached = *start;
-        for tick in 0..800 {
-            let share = (f64::from(tick) / 400.0).min(1.0);
-            reached = sut.nearest(model, &start.lerp_slerp(goal, share));
-        }
-        reached
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(32))]
-
-        #[test]
-        fn what_can_be_reached_is_left_alone(
-            leg in prop::array::uniform3(-0.15..0.15f64), arm in prop::array::uniform3(-0.3..0.3f64),
-        ) {
-            let (model, ready) = (model(), ready());
-            let mut there = ready;
-            for i in 0..3 {
-                there[i] += leg[i];
-                there[12 + i] += arm[i];
-            }
-            let pose = |joints| torso_from_frame(&model, joints, Frame::Gripper(Side::Right));
-            let goal = pose(&there);
-            let mut sut = Reach::new(Side::Right, &ready, Limits::default().reach);
-            let reached = walk(&mut sut, &model, &pose(&ready), &goal);
-            prop_assert!((reached.translation.vector - goal.translation.vector).norm() < 1e-4);
-            prop_assert!(reached.rotation.angle_to(&goal.rotation) < 1e-3);
-        }
-
-        #[test]
-        fn out_of_reach_both_errors_stay_moderate_and_the_way_back_is_found(
-            far in prop::array::uniform3(-0.15..0.15f64), turn in prop::array::uniform3(-0.4..0.4f64),
-        ) {
-            let (model, ready) = (model(), ready());
-            let start = torso_from_frame(&model, &ready, Frame::Gripper(Side::Right));
-            let goal = Isometry3::from_parts(
-                (start.translation.vector + Vector3::from(far)).into(),
-                UnitQuaternion::from_scaled_axis(turn.into()) * start.rotation,
-            );
-            let mut sut = Reach::new(Side::Right, &ready, Limits::default().reach);
-            let reached = walk(&mut sut, &model, &start, &goal);
-            prop_assert!((reached.translation.vector - goal.translation.vector).norm() < 0.45);
-            let back = walk(&mut sut, &model, &goal, &start);
-            prop_assert!((back.translation.vector - start.translation.vector).norm() < 1e-3);
-            prop_assert!(back.rotation.angle_to(&start.rotation) < 1e-2);
-            for joint in [0, 1, 2, 12, 13, 14] {
-                prop_assert!(sut.joints[joint] >= model.lower[joint]);
-                prop_assert!(sut.joints[joint] <= model.upper[joint]);
-            }
-        }
-    }
-}
+mod tests;

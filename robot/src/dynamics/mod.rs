@@ -17,6 +17,7 @@ pub use state::State;
 
 use crate::{
     joints::JOINTS,
+    kinematics::Bodies,
     model::{Frame, GRAVITY, Model, PARENT},
 };
 
@@ -287,6 +288,16 @@ impl Dynamics {
     /// A a + b + g: the forces on torso and joints that make the acceleration `a`.
     pub fn inverse_dynamics(&self, acceleration: &Motion) -> Motion {
         self.mass_matrix * acceleration + self.bias
+    }
+}
+
+impl Bodies for Dynamics {
+    fn pose(&self, joint: usize) -> (&Matrix3<f64>, &Vector3<f64>) {
+        (&self.links[joint].torso_from_body, &self.links[joint].origin)
+    }
+
+    fn axis(&self, joint: usize) -> &Vector3<f64> {
+        &self.links[joint].motion.angular
     }
 }
 

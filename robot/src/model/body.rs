@@ -59,8 +59,8 @@ impl RigidBody {
         if self.mass == 0.0 {
             return (moments.amax() > 0.0).then_some("inertia without mass");
         }
-        if moments.min() < -ROUNDING * greatest {
-            return Some("a negative principal moment of inertia");
+        if moments.min() <= 0.0 {
+            return Some("a principal moment of inertia that is not positive");
         }
         if 2.0 * greatest > moments.sum() + ROUNDING * greatest {
             return Some("a principal moment of inertia above the sum of the other two");

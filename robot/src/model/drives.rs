@@ -35,7 +35,7 @@ impl Drives {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ModelError::Read { file: path.to_owned(), source })?;
         let drives: Self = toml::from_str(&text)
-            .map_err(|source| ModelError::Drives { file: path.to_owned(), source: Box::new(source) })?;
+            .map_err(|source| ModelError::Table { file: path.to_owned(), source: Box::new(source) })?;
         match drives.armature().iter().find(|value| !value.is_finite() || **value < 0.0) {
             None => Ok(drives),
             Some(value) => Err(ModelError::Element {

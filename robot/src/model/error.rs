@@ -21,9 +21,9 @@ pub enum ModelError {
         /// What the parser said.
         source: Box<urdf_rs::UrdfError>,
     },
-    /// The file is no valid table of drives.
+    /// The file is no valid table of numbers.
     #[error("{file}: {source}")]
-    Drives {
+    Table {
         /// The file.
         file: PathBuf,
         /// What the parser said, with the line.

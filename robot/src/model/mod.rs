@@ -26,7 +26,10 @@ pub use frame::Frame;
 use nalgebra::{Isometry3, Unit, Vector3};
 pub use tree::{JOINT_NAMES, PARENT};
 
-use crate::joints::{JOINTS, JointVector, Leg, Side};
+use crate::{
+    collision::CollisionModel,
+    joints::{JOINTS, JointVector, Leg, Side},
+};
 
 /// Standard gravity as the golden figures and the simulator take it, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -59,19 +62,22 @@ pub struct Model {
     pub max_torque: JointVector,
     /// Rotor inertia reflected through the gear, kg m²: added on the diagonal of the mass matrix.
     pub armature: JointVector,
+    /// Capsules on the links, for keeping the robot off itself.
+    pub collision: CollisionModel,
     calf_from_foot: [Isometry3<f64>; 4],
     hand_from_gripper: [Isometry3<f64>; 2],
 }
 
 impl Model {
-    /// Reads `locoman.urdf` and `drives.toml` from a folder (`configs/robot`).
+    /// Reads `locoman.urdf`, `drives.toml` and `collision.toml` from a folder (`configs/robot`).
     pub fn load(folder: &Path) -> Result<Self, ModelError> {
         let mut model = Self::from_urdf(&folder.join("locoman.urdf"))?;
         model.armature = Drives::load(&folder.join("drives.toml"))?.armature();
+        model.collision = CollisionModel::load(&folder.join("collision.toml"))?;
         Ok(model)
     }
 
-    /// Reads a URDF alone: no reflected rotor inertia.
+    /// Reads a URDF alone: no reflected rotor inertia, no shapes.
     pub fn from_urdf(path: &Path) -> Result<Self, ModelError> {
         urdf::read(path)
     }

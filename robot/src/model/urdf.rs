@@ -9,7 +9,10 @@ use super::{
     JOINT_NAMES, Joint, Model, ModelError, PARENT, RigidBody,
     tree::{FOOT_LINKS, GRIPPER_LINKS, TORSO_LINK},
 };
-use crate::joints::{JOINTS, JointVector};
+use crate::{
+    collision::CollisionModel,
+    joints::{JOINTS, JointVector},
+};
 
 /// Reads the file, merges links on fixed joints into their parents, and checks what it holds.
 pub(super) fn read(path: &Path) -> Result<Model, ModelError> {
@@ -39,7 +42,19 @@ impl<'a> Reader<'a> {
     fn new(path: &'a Path, robot: &'a Robot) -> Result<Self, ModelError> {
         let above = robot.joints.iter().map(|joint| (joint.child.link.as_str(), joint)).collect();
         let reader = Self { path, robot, above };
-        for joint in &robot.joints {
+        for (index, link) in robot.links.iter().enumerate() {
+            if robot.links[..index].iter().any(|before| before.name == link.name) {
+                return Err(reader.link_error(&link.name, "is there twice"));
+            }
+        }
+        for (index, joint) in robot.joints.iter().enumerate() {
+            if robot.joints[..index].iter().any(|before| before.name == joint.name) {
+                return Err(reader.joint_error(&joint.name, "is there twice"));
+            }
+            let numbers = joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0);
+            if !numbers.clone().all(|number| number.is_finite()) {
+                return Err(reader.joint_error(&joint.name, "has a number that is not finite"));
+            }
             let known = JOINT_NAMES.contains(&joint.name.as_str());
             let turns = matches!(joint.joint_type, JointType::Revolute | JointType::Continuous);
             if known && !turns {
@@ -107,6 +122,7 @@ impl<'a> Reader<'a> {
             max_velocity,
             max_torque,
             armature: JointVector::zeros(),
+            collision: CollisionModel::default(),
             calf_from_foot,
             hand_from_gripper,
         })

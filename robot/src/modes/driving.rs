@@ -226,7 +226,8 @@ impl Driving {
             let mut position = range.clamp(&wanted.translation.vector, &start, side);
             position.z = position.z.max(lowest);
             let inside = Isometry3::from_parts(position.into(), wanted.rotation);
-            world_from_torso * reach.nearest(scene.model, &world_from_torso.inv_mul(&inside))
+            world_from_torso
+                * reach.nearest(scene.model, scene.desired, &world_from_torso.inv_mul(&inside), scene.dt_s)
         };
         match played {
             Some(sample) => {

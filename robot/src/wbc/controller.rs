@@ -5,7 +5,7 @@ use super::{
     force::ForceProblem,
     ground::{ForceDistribution, GroundReaction},
     objective::Robot,
-    stops::{MOST_IN_A_LIMB, Stops, Surroundings},
+    stops::{MOST_HELD, Stops, Surroundings},
     task::Task,
     tracking::Tracking,
 };
@@ -26,7 +26,7 @@ pub enum StepPart {
     Forces,
 }
 
-/// What the hierarchy asks of torso and joints: q̄ - q, dq̄ and ddq̄, before anything is cut.
+/// What the hierarchy asks of torso and joints: q̄ - q, dq̄ and ddq̄.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracked {
     /// q̄ - q: m and rad in the torso's frame, then rad.
@@ -42,8 +42,9 @@ pub struct WholeBodyController {
     settings: WbcSettings,
     dynamics: Dynamics,
     tracking: Tracking,
-    /// ddq̄ of the last step.
-    acceleration: Motion,
+    stops: Stops,
+    /// Of the last step.
+    tracked: Tracked,
     forces: ForceDistribution,
     failures: u64,
     failures_in_a_row: u32,
@@ -56,7 +57,12 @@ impl WholeBodyController {
             settings,
             dynamics: Dynamics::new(),
             tracking: Tracking::new(),
-            acceleration: Motion::zeros(),
+            stops: Stops::new(),
+            tracked: Tracked {
+                step: Motion::zeros(),
+                velocity: Motion::zeros(),
+                acceleration: Motion::zeros(),
+            },
             forces: ForceDistribution::new(settings.contact),
             failures: 0,
             failures_in_a_row: 0,
@@ -74,12 +80,8 @@ impl WholeBodyController {
     }
 
     /// What the hierarchy asked for in the last step.
-    pub fn tracked(&self) -> Tracked {
-        Tracked {
-            step: self.tracking.position_step(),
-            velocity: self.tracking.velocity(),
-            acceleration: self.acceleration,
-        }
+    pub const fn tracked(&self) -> Tracked {
+        self.tracked
     }
 
     /// The contact-force problem of the last step.
@@ -129,10 +131,9 @@ impl WholeBodyController {
         }
         self.dynamics.update(model, state);
         done(StepPart::Dynamics);
-        let acceleration = self.track(model, state, objectives, contacts, &mut status);
-        self.acceleration = acceleration;
+        self.track(model, state, objectives, contacts, &mut status);
         done(StepPart::Hierarchy);
-        let reaction = self.forces.solve(model, &self.dynamics, contacts, &acceleration);
+        let reaction = self.forces.solve(model, &self.dynamics, contacts, &self.tracked.acceleration);
         done(StepPart::Forces);
         let Some(reaction) = reaction else {
             status.fault = Some(WbcFault::Output);
@@ -151,10 +152,10 @@ impl WholeBodyController {
         }
     }
 
-    /// q̄, dq̄ and ddq̄ of the last objective; returns ddq̄.
+    /// q̄ - q, dq̄ and ddq̄ of the last objective, within all limits.
     ///
     /// The contacts come first. They start the chains with q̄_0 = q, dq̄_0 = 0 and ddq̄_0 = J_c‡ (-J̇_c q̇): the
-    /// paper prints -J_c q̇, which has the unit of a velocity. Then comes what has to stop.
+    /// paper prints -J_c q̇, which has the unit of a velocity. Then come joints that have to be held.
     fn track(
         &mut self,
         model: &Model,
@@ -162,64 +163,39 @@ impl WholeBodyController {
         objectives: &[Objective],
         contacts: &ContactSet,
         status: &mut WbcStatus,
-    ) -> Motion {
+    ) {
         self.tracking.begin(self.dynamics.mass_matrix());
         for leg in contacts.legs() {
             self.tracking.add(Task::contact(&self.dynamics, leg), 0.0);
         }
         let start = self.tracking.mark();
-
-        let mut stops = Stops::default();
-        for _ in 0..=MOST_IN_A_LIMB {
+        let dynamics = &self.dynamics;
+        let around = Surroundings { model, state, dynamics, contacts, objectives, settings: &self.settings };
+        self.stops.begin(&around);
+        for _ in 0..=MOST_HELD {
             self.tracking.rewind(start);
-            self.track_with(state, objectives, &stops, status);
-            let around = Surroundings {
-                model,
-                state,
-                dynamics: &self.dynamics,
-                contacts,
-                objectives,
-                settings: &self.settings,
+            self.stops.for_each_held(|task, damping_start| self.tracking.add(task, damping_start));
+            for objective in objectives {
+                let gains = self.settings.objectives.of(objective.kind());
+                match objective.task(&Robot { state, dynamics }, gains) {
+                    Some(task) => self.tracking.add(task, gains.damping_start),
+                    None => status.fault = Some(WbcFault::Reference),
+                }
+            }
+            let [contacts_only, wanted] = self.tracking.accelerations(start);
+            self.tracked = Tracked {
+                step: self.tracking.position_step(),
+                velocity: self.tracking.velocity(),
+                acceleration: bounded(&self.settings, &contacts_only, &wanted, status),
             };
-            if !stops.extend(&around, &self.tracking.position_step()) {
+            if !self.stops.hold(&self.tracked, &self.settings) {
                 break;
             }
         }
-        status.limited = stops.joints();
-        status.grounded = stops.frames();
-        let [contacts_only, wanted] = self.tracking.accelerations(start);
-        self.bounded(&contacts_only, &wanted, status)
-    }
-
-    /// Stops, then objectives.
-    fn track_with(&mut self, state: &State, objectives: &[Objective], stops: &Stops, status: &mut WbcStatus) {
-        let gains = &self.settings.objectives;
-        let robot = Robot { state, dynamics: &self.dynamics };
-        stops.for_each_task(state, &self.dynamics, &gains.arm_posture, |task| self.tracking.add(task, 0.0));
-        for objective in objectives {
-            let gains = gains.of(objective.kind());
-            match objective.task(&robot, gains) {
-                Some(task) => self.tracking.add(task, gains.damping_start),
-                None => status.fault = Some(WbcFault::Reference),
-            }
-        }
-    }
-
-    /// The objectives' acceleration, scaled back towards that of the contacts alone until all joints are
-    /// below their limit. Every mixture of the two satisfies the contacts exactly; cutting joints one by one
-    /// would not.
-    fn bounded(&self, contacts_only: &Motion, wanted: &Motion, status: &mut WbcStatus) -> Motion {
-        let limit = self.settings.max_joint_acceleration;
-        let mut scale: f64 = 1.0;
-        for index in DOF - JOINTS..DOF {
-            let step = wanted[index] - contacts_only[index];
-            let room = (limit - contacts_only[index] * step.signum()).max(0.0);
-            if step.abs() > room {
-                scale = scale.min(room / step.abs());
-            }
-        }
-        status.acceleration_scale = scale;
-        contacts_only + (wanted - contacts_only) * scale
+        self.stops.restrict(&around, &mut self.tracked);
+        status.limited = self.stops.joints();
+        status.grounded = self.stops.frames();
+        status.kept_apart = self.stops.pair();
     }
 
     fn count_failures(&mut self, reaction: &GroundReaction, status: &mut WbcStatus) {
@@ -241,7 +217,7 @@ impl WholeBodyController {
     /// q̄, dq̄ and τ = A q̈_cmd + b + g - J_cᵀ f_r of the joints, with q̈_cmd = ddq̄ + (δ_t, 0).
     fn command(&self, state: &State, reaction: &GroundReaction) -> WbcOutput {
         let mut output = WbcOutput::hold(state.position);
-        let (step, velocity) = (self.tracking.position_step(), self.tracking.velocity());
+        let Tracked { step, velocity, .. } = &self.tracked;
         for joint in 0..JOINTS {
             output.position[joint] += step[6 + joint];
             output.velocity[joint] = velocity[6 + joint];
@@ -253,5 +229,28 @@ impl WholeBodyController {
     }
 }
 
+/// The objectives' acceleration, scaled back towards that of the contacts alone until all joints are below their
+/// limit. Every mixture of the two satisfies the contacts exactly; cutting joints one by one would not.
+fn bounded(
+    settings: &WbcSettings,
+    contacts_only: &Motion,
+    wanted: &Motion,
+    status: &mut WbcStatus,
+) -> Motion {
+    let limit = settings.max_joint_acceleration;
+    let mut scale: f64 = 1.0;
+    for index in DOF - JOINTS..DOF {
+        let step = wanted[index] - contacts_only[index];
+        let room = (limit - contacts_only[index] * step.signum()).max(0.0);
+        if step.abs() > room {
+            scale = scale.min(room / step.abs());
+        }
+    }
+    status.acceleration_scale = scale;
+    contacts_only + (wanted - contacts_only) * scale
+}
+
+#[cfg(test)]
+mod limit_tests;
 #[cfg(test)]
 mod tests;

@@ -8,6 +8,7 @@
 //! What an operation mode controls is a list of [`Objective`]s, most important first: data, not code.
 //! The world's z axis is up: its gravity points along -z.
 
+mod barrier;
 mod contact;
 mod controller;
 pub mod force;
@@ -26,5 +27,5 @@ pub use contact::ContactSet;
 pub use controller::{StepPart, Tracked, WholeBodyController};
 pub use objective::{Objective, ObjectiveKind, PointReference, RotationReference};
 pub use output::WbcOutput;
-pub use settings::{ContactForceSettings, Gains, ObjectiveGains, SettingsError, WbcSettings};
+pub use settings::{ContactForceSettings, Gains, ObjectiveGains, SettingsError, StopSettings, WbcSettings};
 pub use status::{ForceFailure, ForceSource, WbcFault, WbcStatus};

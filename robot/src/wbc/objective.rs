@@ -102,6 +102,13 @@ pub enum ObjectiveKind {
     ArmPosture(Side),
 }
 
+impl ObjectiveKind {
+    /// Whether it moves the torso, through the legs that stand.
+    pub(super) const fn is_of_torso(self) -> bool {
+        matches!(self, Self::TorsoPosition | Self::TorsoOrientation)
+    }
+}
+
 impl Objective {
     /// What it controls.
     pub const fn kind(&self) -> ObjectiveKind {

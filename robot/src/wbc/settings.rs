@@ -73,6 +73,37 @@ pub struct ContactForceSettings {
     pub failures_to_fault: u32,
 }
 
+/// How joints, limbs and links come to a stop.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StopSettings {
+    /// α: what is left to a limit decays at this rate, 1/s.
+    pub rate: f64,
+    /// a: braking from higher speeds, rad/s² (m/s² for heights).
+    pub braking: f64,
+    /// Greatest acceleration that a limit asks for, rad/s².
+    pub max_acceleration: f64,
+    /// Share of the model's joint velocities that is used.
+    pub speed_share: f64,
+    /// A desired joint position is at most the way of this time at that speed away from where the joint is, s.
+    pub step_time_s: f64,
+    /// Links stay so far apart, m.
+    pub collision_margin: f64,
+}
+
+impl Default for StopSettings {
+    fn default() -> Self {
+        Self {
+            rate: 15.0,
+            braking: 40.0,
+            max_acceleration: 100.0,
+            speed_share: 0.7,
+            step_time_s: 0.05,
+            collision_margin: 0.01,
+        }
+    }
+}
+
 /// Everything in `wbc.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -81,6 +112,8 @@ pub struct WbcSettings {
     pub objectives: ObjectiveGains,
     /// Contact forces.
     pub contact: ContactForceSettings,
+    /// How everything comes to a stop.
+    pub stops: StopSettings,
     /// Joints stop this far before the ends of their ranges, rad.
     pub joint_margin: f64,
     /// A lifted foot stays so far above the height of the standing feet, m.
@@ -148,6 +181,7 @@ impl Default for WbcSettings {
                 slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
                 failures_to_fault: 3,
             },
+            stops: StopSettings::default(),
             joint_margin: 0.01,
             foot_clearance: 0.01,
             gripper_clearance: 0.01,
@@ -191,7 +225,14 @@ impl WbcSettings {
         }
         let contact = &self.contact;
         let least = contact.min_vertical;
+        let stops = &self.stops;
         let checks = [
+            ("stops.rate", positive(stops.rate), "above 0 1/s"),
+            ("stops.braking", positive(stops.braking), "above 0 rad/s2"),
+            ("stops.max_acceleration", positive(stops.max_acceleration), "above 0 rad/s2"),
+            ("stops.speed_share", stops.speed_share > 0.0 && stops.speed_share <= 1.0, "above 0, at most 1"),
+            ("stops.step_time_s", positive(stops.step_time_s), "above 0 s"),
+            ("stops.collision_margin", (0.0..0.05).contains(&stops.collision_margin), "0 to 0.05 m"),
             ("max_joint_acceleration", positive(self.max_joint_acceleration), "above 0 rad/s2"),
             ("joint_margin", (0.0..0.2).contains(&self.joint_margin), "at least 0 and below 0.2 rad"),
             ("foot_clearance", (0.0..0.1).contains(&self.foot_clearance), "at least 0 and below 0.1 m"),

@@ -1,5 +1,7 @@
 //! How a control step went: nothing is limited or given up silently.
 
+use crate::collision::Link;
+
 /// Where the contact forces of a step come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ForceSource {
@@ -52,11 +54,13 @@ pub struct WbcStatus {
     pub torques_relaxed: bool,
     /// Share of the objectives' accelerations that was kept to stay below the joints' limits; 1 normally.
     pub acceleration_scale: f64,
-    /// Joints that are stopped at an end of their range, or whose desired position, velocity or torque was
+    /// Joints that are held to what their range and their speed permit, or whose desired position, velocity or torque was
     /// cut to its limit, a bit for each.
     pub limited: u32,
     /// Frames that are kept above the ground, a bit for each in the order of `Frame::ALL`.
     pub grounded: u32,
+    /// Two links that are kept from touching each other; one such pair if there are more.
+    pub kept_apart: Option<[Link; 2]>,
     /// Set when the output should not be trusted to balance the robot.
     pub fault: Option<WbcFault>,
 }
@@ -70,6 +74,7 @@ impl Default for WbcStatus {
             acceleration_scale: 1.0,
             limited: 0,
             grounded: 0,
+            kept_apart: None,
             fault: None,
         }
     }

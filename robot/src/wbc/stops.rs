@@ -1,32 +1,94 @@
-//! Joints that have reached an end of their range, and limbs that have reached the ground.
+//! What stops: joints at the ends of their ranges and at their greatest speeds, limbs at the ground, links
+//! before they touch.
 //!
-//! Where the hierarchy asks a joint to go beyond its range, the joint is stopped at the end of it, with
-//! priority over all objectives, and the hierarchy is solved again: the other joints of the limb take over
-//! what they can (Flacco, De Luca and Khatib, "Control of redundant robots under hard joint constraints:
-//! saturation in the null space", IEEE Transactions on Robotics 31, 2015). Cutting the result instead would
-//! leave the error to nobody. In the same way a lifted limb's foot and gripper are stopped above the ground
-//! that the other feet stand on: a foot that touches it unplanned lifts the torso off its course.
+//! [`super::barrier`] says how far, how fast and how hard each quantity may go. Where the hierarchy's solution
+//! goes further, it is replaced by the nearest one that does not; the other joints take over what they can.
+//! Cutting would leave the error to nobody, freezing would leave it for good.
+//!
+//! * Joints of a **standing leg** move with the torso. One that would go too far is held, with priority over all
+//!   objectives, and the hierarchy is solved again (Flacco, De Luca and Khatib, "Control of redundant robots under
+//!   hard joint constraints: saturation in the null space", IEEE Transactions on Robotics 31, 2015).
+//! * A **free limb** (a leg in the air with its arm, or the arm of a standing leg) moves nothing else: its joints
+//!   alone are changed, to the nearest motion that all its limits permit ([`crate::polyhedron`]), near in what the
+//!   limb's objectives see. Torso, stance feet and the other limb do not notice.
+
+use nalgebra::{Matrix6, Vector6};
 
 use super::{
-    ContactSet, Gains, Objective, ObjectiveKind, WbcSettings,
+    ContactSet, Objective, ObjectiveKind, Tracked, WbcSettings,
+    barrier::{Interval, Window},
+    objective::Robot,
     task::{Task, height_row},
 };
 use crate::{
-    dynamics::{Dynamics, Motion, State},
+    collision::{Clearance, Clearances, Link, MOST_NEAR},
+    dynamics::{DOF, Dynamics, Motion, State},
     joints::{JOINTS, Leg, Side},
     model::{Frame, Model},
+    polyhedron::Polyhedron,
 };
 
-/// What stops at once in a limb: all joints of a front one, its foot and its gripper.
-pub(super) const MOST_IN_A_LIMB: usize = 8;
+/// What is held at once in the standing legs.
+pub(super) const MOST_HELD: usize = 6;
 
-/// Joints and frames that stop, and where.
-#[derive(Debug, Clone, Copy, Default)]
+/// Directions of a held joint that what stands before it has nearly used up fade out below this.
+const DAMPING_START: f64 = 0.1;
+
+/// Quantities other than joints: feet, grippers, pairs of links.
+const MOST_ROWS: usize = 2 + MOST_NEAR;
+
+/// Shorter gradients of a distance are taken as this long, m/rad: there joints cannot change it.
+const SHORTEST_GRADIENT: f64 = 0.01;
+
+/// A pair of links is looked at when it is nearer than this to its margin, m: at the greatest speed of a
+/// target (0.5 m/s) the barrier begins to act at 0.033 m.
+const INFLUENCE_M: f64 = 0.06;
+
+/// Share of the room between two links that a step may use up: the gradient turns on the way.
+const STEP_SHARE: f64 = 0.5;
+
+/// An error of a radian counts like this many metres where a free limb's objectives compete for what limits
+/// leave. Small: position goes before orientation.
+const METRES_PER_RADIAN: f64 = 0.05;
+
+/// Motion of a free limb's joints that its objectives do not see counts like so many metres for each radian: joints
+/// do not run about for the last millimetre.
+const METRES_PER_JOINT: f64 = 0.02;
+
+/// What a row belongs to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum What {
+    Frame(Frame),
+    Pair([Link; 2]),
+}
+
+/// A quantity's direction in joint space, of length 1, and what is permitted along it.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    what: What,
+    /// Whose joints are changed.
+    leg: Leg,
+    direction: [f64; DOF],
+    /// J̇ q̇ along it.
+    bias: f64,
+    window: Window,
+    acts: bool,
+}
+
+/// All limits of a control step, and which of them act.
+#[derive(Debug, Clone)]
 pub(super) struct Stops {
-    /// Angles, rad.
-    ends: [Option<f64>; JOINTS],
-    /// Heights in the world, m.
-    floors: [Option<f64>; Frame::COUNT],
+    joints: [Window; JOINTS],
+    /// Of standing legs.
+    held: [Option<[f64; 3]>; JOINTS],
+    /// Of free limbs, a bit for each.
+    stopped: u32,
+    /// Legs in the air, by index.
+    lifted: [bool; 4],
+    rows: [Row; MOST_ROWS],
+    count: usize,
+    clearances: Clearances,
+    polyhedron: Polyhedron,
 }
 
 /// What stops depend on, besides the solution.
@@ -40,95 +102,321 @@ pub(super) struct Surroundings<'a> {
 }
 
 impl Stops {
-    /// The stopped joints, a bit for each.
-    pub(super) fn joints(&self) -> u32 {
-        let stopped = self.ends.iter().enumerate().filter(|(_, end)| end.is_some());
-        stopped.fold(0, |joints, (joint, _)| joints | 1 << joint)
-    }
-
-    /// The stopped frames, a bit for each in the order of [`Frame::ALL`].
-    pub(super) fn frames(&self) -> u32 {
-        let stopped = self.floors.iter().enumerate().filter(|(_, floor)| floor.is_some());
-        stopped.fold(0, |frames, (frame, _)| frames | 1 << frame)
-    }
-
-    /// Hands over each stop as a task.
-    pub(super) fn for_each_task(
-        &self,
-        state: &State,
-        dynamics: &Dynamics,
-        gains: &Gains,
-        mut add: impl FnMut(Task),
-    ) {
-        for (joint, end) in self.ends.iter().enumerate() {
-            if let Some(end) = end {
-                add(Task::stop(state, joint, *end, gains));
-            }
-        }
-        for frame in Frame::ALL {
-            if let Some(height) = self.floors[frame.index()] {
-                add(Task::floor(dynamics.frame(frame), height, gains));
-            }
+    /// Takes all memory that it will need.
+    pub(super) fn new() -> Self {
+        let row = Row {
+            what: What::Frame(Frame::Torso),
+            leg: Leg::FrontRight,
+            direction: [0.0; DOF],
+            bias: 0.0,
+            window: Window::free(),
+            acts: false,
+        };
+        Self {
+            joints: [Window::free(); JOINTS],
+            held: [None; JOINTS],
+            stopped: 0,
+            lifted: [false; 4],
+            rows: [row; MOST_ROWS],
+            count: 0,
+            clearances: Clearances::new(),
+            polyhedron: Polyhedron::new(),
         }
     }
 
-    /// Stops what a solution q̄ - q takes too far: in each limb the joint that goes furthest beyond its range
-    /// (limbs meet only in the torso, so that they can be dealt with side by side), and whatever would touch
-    /// the ground. Whether there was anything.
-    pub(super) fn extend(&mut self, around: &Surroundings, step: &Motion) -> bool {
-        let mut found = false;
-        for leg in Leg::ALL {
-            found |= self.stop_joint(around, leg, step);
+    /// Finds what is permitted in a state. Nothing is held yet.
+    pub(super) fn begin(&mut self, around: &Surroundings) {
+        self.lifted = Leg::ALL.map(|leg| !around.contacts.contains(leg));
+        self.held = [None; JOINTS];
+        (self.stopped, self.count) = (0, 0);
+        self.limit_joints(around);
+        self.limit_heights(around);
+        self.limit_distances(around);
+    }
+
+    fn limit_joints(&mut self, around: &Surroundings) {
+        let Surroundings { model, state, settings, .. } = around;
+        for (joint, window) in self.joints.iter_mut().enumerate() {
+            let (angle, speed) = (state.position[joint], state.velocity[joint]);
+            let below = angle - model.lower[joint] - settings.joint_margin;
+            let over = model.upper[joint] - settings.joint_margin - angle;
+            let speed_limit = settings.stops.speed_share * model.max_velocity[joint];
+            *window = Window::joint(below, over, speed, speed_limit, &settings.stops);
         }
-        let Some(ground) = ground_height(around) else { return found };
+    }
+
+    /// A lifted limb's foot, unless it is being put down, and its gripper stay above the ground that the other
+    /// feet stand on: a foot that touches it unplanned lifts the torso off its course.
+    fn limit_heights(&mut self, around: &Surroundings) {
+        let Some(ground) = ground_height(around) else { return };
         for leg in Leg::ALL.into_iter().filter(|leg| !around.contacts.contains(*leg)) {
             let lands = |objective: &Objective| objective.kind() == ObjectiveKind::FootPosition(leg);
             if !around.objectives.iter().any(lands) {
-                let least = ground + around.settings.foot_clearance;
-                found |= self.stop_frame(around, Frame::Foot(leg), least, step);
+                self.limit_height(around, Frame::Foot(leg), leg, ground + around.settings.foot_clearance);
             }
-            if let Some(side) = Side::ALL.into_iter().find(|side| side.leg() == leg) {
-                let least = ground + around.settings.gripper_clearance;
-                found |= self.stop_frame(around, Frame::Gripper(side), least, step);
+            if let Some(side) = side_of(leg) {
+                self.limit_height(
+                    around,
+                    Frame::Gripper(side),
+                    leg,
+                    ground + around.settings.gripper_clearance,
+                );
+            }
+        }
+    }
+
+    fn limit_height(&mut self, around: &Surroundings, frame: Frame, leg: Leg, least: f64) {
+        let motion = around.dynamics.frame(frame);
+        let row = height_row(motion);
+        let room = motion.world_from_frame.translation.z - least;
+        let scale =
+            1.0 / row[6..].iter().map(|entry| entry * entry).sum::<f64>().sqrt().max(SHORTEST_GRADIENT);
+        self.push(Row {
+            what: What::Frame(frame),
+            leg,
+            direction: row.map(|entry| entry * scale),
+            bias: motion.bias_acceleration.z * scale,
+            window: Window::above(room * scale, motion.velocity.z * scale, 1.0, &around.settings.stops),
+            acts: false,
+        });
+    }
+
+    /// Links of free limbs keep their distance from each other and from the rest of the robot. How the gradient
+    /// itself turns is left to the margin: at 2 rad/s and 0.2 m it comes to 0.8 m/s², which the barrier balances
+    /// 4 mm nearer.
+    fn limit_distances(&mut self, around: &Surroundings) {
+        let Surroundings { model, state, dynamics, settings, .. } = around;
+        let margin = settings.stops.collision_margin;
+        let pairs = model.collision.pairs();
+        self.clearances.update(&model.collision, pairs, *dynamics, margin + INFLUENCE_M);
+        for index in 0..self.clearances.near().len() {
+            let clearance = self.clearances.near()[index];
+            let Some(leg) = self.mover(&clearance) else { continue };
+            let gradient = clearance.gradient(*dynamics);
+            let scale = 1.0 / gradient.norm().max(SHORTEST_GRADIENT);
+            let mut direction = [0.0; DOF];
+            direction[6..].copy_from_slice((gradient * scale).as_slice());
+            let (room, speed) = (clearance.distance - margin, gradient.dot(&state.velocity));
+            self.push(Row {
+                what: What::Pair(clearance.links),
+                leg,
+                direction,
+                bias: 0.0,
+                window: Window::above(room * scale, speed * scale, STEP_SHARE, &settings.stops),
+                acts: false,
+            });
+        }
+    }
+
+    fn push(&mut self, row: Row) {
+        if let Some(place) = self.rows.get_mut(self.count) {
+            *place = row;
+            self.count += 1;
+        }
+    }
+
+    /// The limb that makes way when two links come near: one in the air, or else one whose arm it is. Two standing
+    /// legs do not come near unless the torso leans further than it may.
+    fn mover(&self, clearance: &Clearance) -> Option<Leg> {
+        let free = |link: &Link| link.leg.filter(|leg| self.lifted[leg.index()] || link.part.is_of_arm());
+        let [first, second] = &clearance.links;
+        let lifted = |leg: &Leg| self.lifted[leg.index()];
+        let (first, second) = (free(first), free(second));
+        second.filter(lifted).or(first.filter(lifted)).or(second).or(first)
+    }
+
+    /// The joints that a leg's limb can move without moving anything else; the first are those of the leg itself.
+    fn free_joints(&self, leg: Leg) -> impl Iterator<Item = usize> {
+        let of_leg = leg.first_joint()..leg.first_joint() + if self.lifted[leg.index()] { 3 } else { 0 };
+        let arm = side_of(leg).map(Side::first_arm_joint);
+        of_leg.chain(arm.into_iter().flat_map(|first| first..first + 3))
+    }
+
+    /// Hands over each joint of a standing leg that is held.
+    pub(super) fn for_each_held(&self, mut add: impl FnMut(Task, f64)) {
+        for (joint, held) in self.held.iter().enumerate() {
+            if let Some([step, velocity, acceleration]) = *held {
+                let mut direction = [0.0; DOF];
+                direction[6 + joint] = 1.0;
+                add(Task::held(direction, step, velocity, acceleration), DAMPING_START);
+            }
+        }
+    }
+
+    /// Holds, in each standing leg, the joint that a solution takes furthest beyond what is permitted. Whether there
+    /// was any.
+    pub(super) fn hold(&mut self, solution: &Tracked, settings: &WbcSettings) -> bool {
+        let mut found = false;
+        for leg in Leg::ALL.into_iter().filter(|leg| !self.lifted[leg.index()]) {
+            // Rounding is no excess.
+            let mut worst = (1e-9, None);
+            for joint in leg.first_joint()..leg.first_joint() + 3 {
+                let excess = solution.excess(6 + joint, &self.joints[joint], settings.stops.rate);
+                if self.held[joint].is_none() && excess > worst.0 {
+                    worst = (excess, Some(joint));
+                }
+            }
+            if let Some(joint) = worst.1 {
+                self.held[joint] = Some(solution.within(6 + joint, &self.joints[joint]));
+                found = true;
             }
         }
         found
     }
 
-    fn stop_joint(&mut self, around: &Surroundings, leg: Leg, step: &Motion) -> bool {
-        let margin = around.settings.joint_margin;
-        let mut worst = (0.0, None);
-        for joint in limb(leg).filter(|joint| self.ends[*joint].is_none()) {
-            let wanted = around.state.position[joint] + step[6 + joint];
-            let (lower, upper) = (around.model.lower[joint] + margin, around.model.upper[joint] - margin);
-            let end = wanted.max(lower).min(upper);
-            if (wanted - end).abs() > worst.0 {
-                worst = ((wanted - end).abs(), Some((joint, end)));
+    /// Brings the joints of each free limb to the nearest motion that all its limits permit.
+    pub(super) fn restrict(&mut self, around: &Surroundings, solution: &mut Tracked) {
+        for leg in Leg::ALL {
+            let mut joints = [None; 6];
+            for (place, joint) in joints.iter_mut().zip(self.free_joints(leg)) {
+                *place = Some(joint);
+            }
+            let mut metric = None;
+            for chain in Chain::ALL {
+                self.enclose(leg, &joints, chain, solution);
+                if self.polyhedron.contains_zero() {
+                    continue;
+                }
+                let metric = metric.get_or_insert_with(|| metric_of(around, &joints));
+                let Some(change) = self.polyhedron.nearest(metric) else { continue };
+                let motion = solution.chain_mut(chain);
+                for (joint, change) in joints.iter().zip(change.iter()) {
+                    if let Some(joint) = joint {
+                        motion[6 + joint] += change;
+                    }
+                }
             }
         }
-        let (_, Some((joint, end))) = worst else { return false };
-        self.ends[joint] = Some(end);
-        true
     }
 
-    fn stop_frame(&mut self, around: &Surroundings, frame: Frame, least: f64, step: &Motion) -> bool {
-        let motion = around.dynamics.frame(frame);
-        let row = height_row(motion);
-        let rise: f64 = row.iter().zip(step.iter()).map(|(entry, step)| entry * step).sum();
-        let touches = motion.world_from_frame.translation.z + rise < least;
-        let new = touches && self.floors[frame.index()].is_none();
-        if new {
-            self.floors[frame.index()] = Some(least);
+    /// Makes the polyhedron of one limb, around one chain of the solution, and notes what acts.
+    fn enclose(&mut self, leg: Leg, joints: &[Option<usize>; 6], chain: Chain, solution: &Tracked) {
+        let motion = solution.chain(chain);
+        self.polyhedron.clear();
+        for (place, joint) in joints.iter().enumerate() {
+            let Some(joint) = *joint else { continue };
+            let interval = chain.of(&self.joints[joint]);
+            let value = motion[6 + joint];
+            let unit = Vector6::ith(place, 1.0);
+            self.polyhedron.push(unit, interval.lower() - value);
+            self.polyhedron.push(-unit, value - interval.upper());
+            if interval.excess(value) > 1e-9 {
+                self.stopped |= 1 << joint;
+            }
         }
-        new
+        for row in self.rows[..self.count].iter_mut().filter(|row| row.leg == leg) {
+            let along: f64 = row.direction.iter().zip(motion.iter()).map(|(a, b)| a * b).sum();
+            let value = if chain == Chain::Acceleration { along + row.bias } else { along };
+            let of_joints =
+                Vector6::from_fn(|place, _| joints[place].map_or(0.0, |joint| row.direction[6 + joint]));
+            let interval = chain.of(&row.window);
+            self.polyhedron.push(of_joints, interval.lower() - value);
+            row.acts |= interval.excess(value) > 1e-9;
+        }
+    }
+
+    /// The joints that are limited, a bit for each.
+    pub(super) fn joints(&self) -> u32 {
+        let held = self.held.iter().enumerate().filter(|(_, held)| held.is_some());
+        held.fold(self.stopped, |joints, (joint, _)| joints | 1 << joint)
+    }
+
+    /// The frames that are kept above the ground, a bit for each in the order of [`Frame::ALL`].
+    pub(super) fn frames(&self) -> u32 {
+        let frames = self.acting().filter_map(|row| match row.what {
+            What::Frame(frame) => Some(frame.index()),
+            What::Pair(_) => None,
+        });
+        frames.fold(0, |frames, frame| frames | 1 << frame)
+    }
+
+    /// One of the pairs of links that are kept apart.
+    pub(super) fn pair(&self) -> Option<[Link; 2]> {
+        self.acting().find_map(|row| match row.what {
+            What::Frame(_) => None,
+            What::Pair(links) => Some(links),
+        })
+    }
+
+    fn acting(&self) -> impl Iterator<Item = &Row> {
+        self.rows[..self.count].iter().filter(|row| row.acts)
     }
 }
 
-/// The joints of a leg and of the arm that it carries.
-fn limb(leg: Leg) -> impl Iterator<Item = usize> {
-    let arm = Side::ALL.into_iter().find(|side| side.leg() == leg).map(Side::first_arm_joint);
-    let of_leg = leg.first_joint()..leg.first_joint() + 3;
-    of_leg.chain(arm.into_iter().flat_map(|first| first..first + 3))
+/// One of the three chains of the hierarchy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Chain {
+    Step,
+    Velocity,
+    Acceleration,
+}
+
+impl Chain {
+    const ALL: [Self; 3] = [Self::Step, Self::Velocity, Self::Acceleration];
+
+    const fn of(self, window: &Window) -> &Interval {
+        match self {
+            Self::Step => &window.step,
+            Self::Velocity => &window.velocity,
+            Self::Acceleration => &window.acceleration,
+        }
+    }
+}
+
+impl Tracked {
+    const fn chain(&self, chain: Chain) -> &Motion {
+        match chain {
+            Chain::Step => &self.step,
+            Chain::Velocity => &self.velocity,
+            Chain::Acceleration => &self.acceleration,
+        }
+    }
+
+    const fn chain_mut(&mut self, chain: Chain) -> &mut Motion {
+        match chain {
+            Chain::Step => &mut self.step,
+            Chain::Velocity => &mut self.velocity,
+            Chain::Acceleration => &mut self.acceleration,
+        }
+    }
+
+    /// How far one entry is beyond what is permitted, in the unit of a step: what the barrier would make of an
+    /// excess of velocity or acceleration.
+    fn excess(&self, index: usize, window: &Window, rate: f64) -> f64 {
+        let of_velocity = window.velocity.excess(self.velocity[index]) / rate;
+        let of_acceleration = window.acceleration.excess(self.acceleration[index]) / (rate * rate);
+        window.step.excess(self.step[index]).max(of_velocity).max(of_acceleration)
+    }
+
+    /// The nearest values of one entry that are permitted.
+    fn within(&self, index: usize, window: &Window) -> [f64; 3] {
+        Chain::ALL.map(|chain| chain.of(window).nearest(self.chain(chain)[index]))
+    }
+}
+
+/// M: how far a change of a free limb's joints moves what its objectives control.
+fn metric_of(around: &Surroundings, joints: &[Option<usize>; 6]) -> Matrix6<f64> {
+    let mut metric = Matrix6::identity() * METRES_PER_JOINT.powi(2);
+    let robot = Robot { state: around.state, dynamics: around.dynamics };
+    for objective in around.objectives.iter().filter(|objective| !objective.kind().is_of_torso()) {
+        let weight = match objective.kind() {
+            ObjectiveKind::FootPosition(_) | ObjectiveKind::GripperPosition(_) => 1.0,
+            _ => METRES_PER_RADIAN.powi(2),
+        };
+        let Some(task) = objective.task(&robot, around.settings.objectives.of(objective.kind())) else {
+            continue;
+        };
+        for row in &task.rows {
+            let of_joints = Vector6::from_fn(|place, _| joints[place].map_or(0.0, |joint| row[6 + joint]));
+            metric.ger(weight, &of_joints, &of_joints, 1.0);
+        }
+    }
+    metric
+}
+
+/// The side of a front leg.
+fn side_of(leg: Leg) -> Option<Side> {
+    Side::ALL.into_iter().find(|side| side.leg() == leg)
 }
 
 /// Mean height of the standing feet's centres; nothing without any.

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Gains, hierarchy::Rows};
 use crate::{
-    dynamics::{DOF, Dynamics, FrameMotion, State},
+    dynamics::{DOF, Dynamics, FrameMotion},
     joints::Leg,
     model::Frame,
 };
@@ -34,25 +34,11 @@ impl Task {
         }
     }
 
-    /// A joint that stops at an end of its range.
-    pub(super) fn stop(state: &State, joint: usize, end: f64, gains: &Gains) -> Self {
-        let mut row = [0.0; DOF];
-        row[6 + joint] = 1.0;
-        Self::single(row, end - state.position[joint], state.velocity[joint], 0.0, gains)
-    }
-
-    /// A frame that stops at a height.
-    pub(super) fn floor(frame: &FrameMotion, height: f64, gains: &Gains) -> Self {
-        let error = height - frame.world_from_frame.translation.z;
-        Self::single(height_row(frame), error, frame.velocity.z, frame.bias_acceleration.z, gains)
-    }
-
-    /// One row that comes to rest; the other two are empty.
-    fn single(row: [f64; DOF], error: f64, velocity: f64, bias: f64, gains: &Gains) -> Self {
+    /// A quantity that is held to what is permitted to it: one row; the other two are empty.
+    pub(super) fn held(row: [f64; DOF], step: f64, velocity: f64, acceleration: f64) -> Self {
         let along = |value: f64| Vector3::new(value, 0.0, 0.0);
         let rows = [row, [0.0; DOF], [0.0; DOF]];
-        let motion = [Vector3::zeros(), along(velocity)];
-        Self::commanded(rows, along(error), motion, Vector3::zeros(), along(bias), gains)
+        Self { rows, error: along(step), velocity: along(velocity), acceleration: along(acceleration) }
     }
 
     /// Whether every number but the rows is finite; those of the state are checked before.

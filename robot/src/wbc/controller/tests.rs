@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
+    collision::CollisionModel,
     joints::{JointVector, Leg, Side},
     model::Frame,
     wbc::{PointReference, RotationReference},
@@ -41,8 +42,10 @@ fn unlimited() -> WbcSettings {
     settings
 }
 
-/// Joints that may go anywhere.
+/// Joints that may go anywhere, at any speed, through each other.
 fn without_ends(model: &mut Model) {
+    model.collision = CollisionModel::default();
+    model.max_velocity.fill(1e9);
     model.lower.fill(-1e9);
     model.upper.fill(1e9);
 }
@@ -106,14 +109,16 @@ proptest! {
         numbers in numbers(48),
         demands in numbers(72),
     ) {
-        let model = model();
+        let mut model = model();
+        // Links of random postures overlap, and push joints beyond anything.
+        model.collision = CollisionModel::default();
         let state = random_state(&model, &numbers);
         let objectives = random_objectives(&demands);
         let contacts = ContactSet::without(Leg::FrontRight);
         let mut sut = WholeBodyController::new(bottomless(WbcSettings::default()));
         sut.dynamics.update(&model, &state);
         sut.track(&model, &state, &objectives[..5], &contacts, &mut WbcStatus::default());
-        let step = sut.tracking.position_step();
+        let step = sut.tracked.step;
         for leg in contacts.legs() {
             let jacobian = sut.dynamics.frame(Frame::Foot(leg)).jacobian;
             prop_assert!((jacobian.fixed_rows::<3>(0) * step).amax() < LEAKAGE);
@@ -137,9 +142,8 @@ proptest! {
 
         let mut before: Vec<[Vector3<f64>; 3]> = Vec::new();
         for count in 0..=objectives.len() {
-            let acceleration = sut.track(&model, &state, &objectives[..count], &contacts, &mut WbcStatus::default());
-            let position = sut.tracking.position_step();
-            let velocity = sut.tracking.velocity();
+            sut.track(&model, &state, &objectives[..count], &contacts, &mut WbcStatus::default());
+            let Tracked { step: position, velocity, acceleration } = sut.tracked;
             let tolerance = LEAKAGE + RELATIVE * acceleration.amax();
 
             for leg in contacts.legs() {
@@ -196,15 +200,17 @@ fn objectives_that_can_be_reached_are_reached() {
         Objective::ArmPosture(Side::Left, point(nudge)),
     ];
     let contacts = ContactSet::without(Leg::FrontRight);
-    let acceleration = sut.track(&model, &state, &objectives, &contacts, &mut WbcStatus::default());
+    sut.track(&model, &state, &objectives, &contacts, &mut WbcStatus::default());
+    let solution = sut.tracked;
     for objective in &objectives {
         let gains = sut.settings.objectives.of(objective.kind());
         let task = objective.task(&Robot { state: &state, dynamics: &sut.dynamics }, gains).unwrap();
-        let position = reached(&task, &sut.tracking.position_step());
-        let velocity = reached(&task, &sut.tracking.velocity());
+        let position = reached(&task, &solution.step);
+        let velocity = reached(&task, &solution.velocity);
         assert!((position - task.error).amax() < 1e-10, "{:?}", objective.kind());
         assert!((velocity - task.velocity).amax() < 1e-10, "{:?}", objective.kind());
-        assert!((reached(&task, &acceleration) - task.acceleration).amax() < 1e-8, "{:?}", objective.kind());
+        let acceleration = reached(&task, &solution.acceleration);
+        assert!((acceleration - task.acceleration).amax() < 1e-8, "{:?}", objective.kind());
     }
 }
 
@@ -233,16 +239,16 @@ fn a_lifted_foot_stays_above_the_ground_when_its_gripper_is_called_below() {
     ];
     let mut status = WbcStatus::default();
     sut.track(&model, &state, &objectives, &contacts, &mut status);
+    let step = sut.tracked.step;
 
     let ground = height(&sut, Leg::RearLeft);
-    let step = sut.tracking.position_step();
     for (frame, clearance) in [
         (Frame::Foot(Leg::FrontRight), sut.settings.foot_clearance),
         (Frame::Gripper(Side::Right), sut.settings.gripper_clearance),
     ] {
         let motion = sut.dynamics.frame(frame);
         let reached = motion.world_from_frame.translation.z + (motion.jacobian * step).z;
-        assert!(reached > ground + clearance - 1e-9, "{frame:?} at {reached}, ground at {ground}");
+        assert!(reached > ground + clearance - 1e-6, "{frame:?} at {reached}, ground at {ground}");
     }
     assert_ne!(status.grounded, 0);
     // The torso does not follow the gripper down.

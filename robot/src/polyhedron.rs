@@ -1,0 +1,281 @@
+//! The nearest point of a polyhedron: how a limb's motion is brought inside its limits, by the whole-body
+//! controller and by the commander.
+//!
+//! ```text
+//! minimize   ½ dᵀ M d + ½/ρ Σ s_i²      over d in R⁶, s
+//! subject to a_i · d + s_i ≥ b_i
+//! ```
+//! With M = L Lᵀ and z = Lᵀ d this is a least-norm problem, solved by the dual active-set method of Goldfarb and
+//! Idnani ("A numerically stable dual method for solving strictly convex quadratic programs", Mathematical
+//! Programming 27, 1983). A projection onto a convex set: the result is unique and moves no more than what is
+//! projected does, so that limits which begin or cease to act cause no jump. The slack s, with its small ρ, makes
+//! limits that contradict each other give way to each other in place of having no solution.
+
+use nalgebra::{Matrix6, Vector6};
+
+/// The most constraints.
+const MOST: usize = 48;
+/// The most that act at once.
+const MOST_ACTIVE: usize = 12;
+/// ρ, against rows of about length 1 in z: what is permitted is exceeded by a millionth of the multiplier.
+const SOFTNESS: f64 = 1e-6;
+/// Rows shorter than this in z cannot be changed by the joints.
+const SHORTEST: f64 = 1e-6;
+/// Excess that is none, as a share of a row's length in z.
+const TOLERANCE: f64 = 1e-9;
+
+/// Constraints a_i · d ≥ b_i on a limb's motion.
+#[derive(Debug, Clone)]
+pub(crate) struct Polyhedron {
+    rows: [Vector6<f64>; MOST],
+    bounds: [f64; MOST],
+    count: usize,
+}
+
+impl Polyhedron {
+    pub(crate) fn new() -> Self {
+        Self { rows: [Vector6::zeros(); MOST], bounds: [0.0; MOST], count: 0 }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds a · d ≥ b.
+    pub(crate) fn push(&mut self, row: Vector6<f64>, bound: f64) {
+        if self.count < MOST && bound.is_finite() {
+            self.rows[self.count] = row;
+            self.bounds[self.count] = bound;
+            self.count += 1;
+        }
+    }
+
+    /// Whether d = 0 satisfies all.
+    pub(crate) fn contains_zero(&self) -> bool {
+        self.bounds[..self.count].iter().all(|bound| *bound <= 1e-12)
+    }
+
+    /// The d nearest to 0 in the metric M; nothing if M is not positive definite.
+    pub(crate) fn nearest(&self, metric: &Matrix6<f64>) -> Option<Vector6<f64>> {
+        let lower = metric.cholesky()?.unpack();
+        let mut rows = [Vector6::zeros(); MOST];
+        let mut bounds = self.bounds;
+        for (index, row) in self.rows[..self.count].iter().enumerate() {
+            let mut z = *row;
+            // L z = a; then of length 1.
+            lower.solve_lower_triangular_mut(&mut z);
+            let length = z.norm();
+            if length > SHORTEST {
+                rows[index] = z / length;
+                bounds[index] /= length;
+            } else {
+                bounds[index] = f64::NEG_INFINITY;
+            }
+        }
+        let mut z = least_norm(&rows[..self.count], &bounds[..self.count]);
+        lower.tr_solve_lower_triangular_mut(&mut z);
+        z.iter().all(|entry| entry.is_finite()).then_some(z)
+    }
+}
+
+/// The constraints that act, and their multipliers.
+struct Active {
+    index: [usize; MOST_ACTIVE],
+    multiplier: [f64; MOST_ACTIVE],
+    count: usize,
+}
+
+/// The shortest z with c_i · z + s_i ≥ b_i, for rows c_i of length 1.
+fn least_norm(rows: &[Vector6<f64>], bounds: &[f64]) -> Vector6<f64> {
+    /// Far more than are ever needed.
+    const ROUNDS: usize = 100;
+    let mut z = Vector6::zeros();
+    let mut active = Active { index: [0; MOST_ACTIVE], multiplier: [0.0; MOST_ACTIVE], count: 0 };
+    let mut entering: Option<(usize, f64)> = None;
+    for _ in 0..ROUNDS {
+        let (new, multiplier) = match entering {
+            Some(entering) => entering,
+            None => match active.worst(rows, bounds, &z) {
+                Some(index) if active.count < MOST_ACTIVE => (index, 0.0),
+                _ => break,
+            },
+        };
+        // Along `way` the new constraint is approached while those that act stay as they are.
+        let give = active.give(rows, &rows[new]);
+        let mut way = rows[new];
+        for (slot, give) in give.iter().enumerate().take(active.count) {
+            way -= rows[active.index[slot]] * *give;
+        }
+        let gain = rows[new].dot(&way) + SOFTNESS;
+        let full = (bounds[new] - rows[new].dot(&z) - SOFTNESS * multiplier) / gain;
+        let (blocking, longest) = active.longest_step(&give);
+        let step = full.min(longest);
+        z += way * step;
+        for slot in 0..active.count {
+            active.multiplier[slot] -= step * give[slot];
+        }
+        let multiplier = multiplier + step;
+        if longest < full {
+            active.remove(blocking);
+            entering = Some((new, multiplier));
+        } else {
+            active.add(new, multiplier);
+            entering = None;
+        }
+    }
+    z
+}
+
+impl Active {
+    /// The constraint that is exceeded most.
+    fn worst(&self, rows: &[Vector6<f64>], bounds: &[f64], z: &Vector6<f64>) -> Option<usize> {
+        let mut worst = (TOLERANCE, None);
+        for (index, (row, bound)) in rows.iter().zip(bounds).enumerate() {
+            let excess = bound - row.dot(z);
+            if excess > worst.0 && !self.index[..self.count].contains(&index) {
+                worst = (excess, Some(index));
+            }
+        }
+        worst.1
+    }
+
+    /// (C Cᵀ + ρ)⁻¹ C c: by how much the multipliers fall for each unit of the new one.
+    fn give(&self, rows: &[Vector6<f64>], new: &Vector6<f64>) -> [f64; MOST_ACTIVE] {
+        let mut factor = [[0.0; MOST_ACTIVE]; MOST_ACTIVE];
+        let mut give = [0.0; MOST_ACTIVE];
+        for i in 0..self.count {
+            let row = &rows[self.index[i]];
+            for j in 0..=i {
+                let mut entry = row.dot(&rows[self.index[j]]) + if i == j { SOFTNESS } else { 0.0 };
+                for k in 0..j {
+                    entry -= factor[i][k] * factor[j][k];
+                }
+                factor[i][j] = if i == j { entry.max(1e-15).sqrt() } else { entry / factor[j][j] };
+            }
+            give[i] = row.dot(new);
+            for k in 0..i {
+                give[i] -= factor[i][k] * give[k];
+            }
+            give[i] /= factor[i][i];
+        }
+        for i in (0..self.count).rev() {
+            for k in i + 1..self.count {
+                give[i] -= factor[k][i] * give[k];
+            }
+            give[i] /= factor[i][i];
+        }
+        give
+    }
+
+    /// The first multiplier to become zero, and after which step.
+    fn longest_step(&self, give: &[f64; MOST_ACTIVE]) -> (usize, f64) {
+        let mut longest = (0, f64::INFINITY);
+        for slot in 0..self.count {
+            if give[slot] > 1e-12 {
+                let step = (self.multiplier[slot] / give[slot]).max(0.0);
+                if step < longest.1 {
+                    longest = (slot, step);
+                }
+            }
+        }
+        longest
+    }
+
+    fn add(&mut self, index: usize, multiplier: f64) {
+        self.index[self.count] = index;
+        self.multiplier[self.count] = multiplier;
+        self.count += 1;
+    }
+
+    fn remove(&mut self, slot: usize) {
+        self.count -= 1;
+        self.index[slot] = self.index[self.count];
+        self.multiplier[slot] = self.multiplier[self.count];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn vector() -> impl Strategy<Value = Vector6<f64>> {
+        prop::array::uniform6(-1.0..1.0f64).prop_map(Vector6::from)
+    }
+
+    fn metric() -> impl Strategy<Value = Matrix6<f64>> {
+        prop::array::uniform6(prop::array::uniform6(-0.3..0.3f64)).prop_map(|rows| {
+            let root = Matrix6::from_fn(|row, column| rows[row][column]);
+            root * root.transpose() + Matrix6::identity() * 0.01
+        })
+    }
+
+    fn polyhedron(rows: &[(Vector6<f64>, f64)]) -> Polyhedron {
+        let mut sut = Polyhedron::new();
+        for (row, bound) in rows {
+            sut.push(*row, *bound);
+        }
+        sut
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_point_satisfies_the_conditions_of_karush_kuhn_and_tucker(
+            rows in prop::collection::vec((vector(), -0.5..0.3f64), 1..9), metric in metric(),
+        ) {
+            let sut = polyhedron(&rows);
+            let d = sut.nearest(&metric).unwrap();
+            // Feasible up to the slack, for these random rows nearly always possible.
+            let excess = |(row, bound): &(Vector6<f64>, f64)| bound - row.dot(&d);
+            prop_assume!(rows.iter().all(|row| excess(row) < 1e-3));
+            // No feasible direction lowers the cost: compare with many other feasible points.
+            let cost = |d: &Vector6<f64>| 0.5 * d.dot(&(metric * d));
+            for scale in [0.3, 0.03, 0.003] {
+                for (way, _) in &rows {
+                    for sign in [-1.0, 1.0] {
+                        let other = d + way * (sign * scale);
+                        let feasible = rows.iter().all(|(row, bound)| row.dot(&other) >= *bound);
+                        prop_assert!(!feasible || cost(&other) > cost(&d) - 1e-4, "{} {}", cost(&other), cost(&d));
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn it_moves_no_more_than_the_bounds(
+            rows in prop::collection::vec((vector(), -0.5..0.3f64), 1..12),
+            shift in prop::collection::vec(-1e-4..1e-4f64, 12),
+            metric in metric(),
+        ) {
+            let moved: Vec<_> = rows.iter().zip(&shift).map(|((row, bound), by)| (*row, bound + by)).collect();
+            let (a, b) = (polyhedron(&rows).nearest(&metric).unwrap(), polyhedron(&moved).nearest(&metric).unwrap());
+            prop_assume!(a.norm() < 3.0);
+            prop_assert!((a - b).norm() < 0.05, "{}", (a - b).norm());
+        }
+    }
+
+    #[test]
+    fn what_is_inside_stays() {
+        let sut = polyhedron(&[(Vector6::x(), -0.1), (-Vector6::x(), -0.1)]);
+        assert!(sut.contains_zero());
+        assert_eq!(sut.nearest(&Matrix6::identity()).unwrap(), Vector6::zeros());
+    }
+
+    #[test]
+    fn limits_that_contradict_each_other_share_the_excess() {
+        let sut = polyhedron(&[(Vector6::x(), 1.0), (-Vector6::x(), 1.0)]);
+        let d = sut.nearest(&Matrix6::identity()).unwrap();
+        assert!(d.norm() < 1e-6, "{d}");
+    }
+
+    #[test]
+    fn a_stopped_joint_is_made_up_for_by_the_others() {
+        // Two joints move one point: stopping the first lets the second do all.
+        let row = Vector6::x() + Vector6::y();
+        let metric = row * row.transpose() + Matrix6::identity() * 1e-4;
+        // The first is to go back by 0.1.
+        let d = polyhedron(&[(-Vector6::x(), 0.1)]).nearest(&metric).unwrap();
+        assert!((d.x + 0.1).abs() < 1e-5 && (d.y - 0.1).abs() < 1e-3, "{d}");
+    }
+}
