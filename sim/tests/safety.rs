@@ -171,15 +171,22 @@ fn r_safe_017_a_foot_that_feels_no_ground_takes_no_load() {
     let mut sut = in_gripper(Side::Right);
     sut.operator().mode = Some(Mode::Stance);
     sut.operator().mode_request += 1;
+    let mut pressed_n: f64 = 0.0;
     for _ in 0..(10.0 * 400.0) as usize {
         let mut sensors = sut.plant.exchange(&sut.command).unwrap();
+        // The ground is there, but the foot's sensor is dumb.
         sensors.foot_force[0] = 0.0;
+        if sut.snapshot().phase == Phase::LowerFoot(Side::Right) {
+            pressed_n = pressed_n.max(sut.plant.truth().foot_force_n[0]);
+        }
         sut.operator().received_ns = sensors.time_ns;
         sut.operator().sequence += 1;
         let inputs = Inputs { command: sut.operator, ..Inputs::default() };
         sut.command = sut.controller.tick(sensors.time_ns, &sensors, &inputs);
     }
     assert_eq!(sut.snapshot().phase, Phase::LowerFoot(Side::Right));
+    // Less than what would lift the foot opposite.
+    assert!(pressed_n < 28.0, "{pressed_n}");
     assert!(sut.snapshot().assessment.reasons.contains(Reason::NoGround));
     sut.run_until("four feet", 5.0, |s| s.phase == Phase::Stance);
 }

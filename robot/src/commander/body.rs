@@ -24,6 +24,8 @@ const TOLERANCE_RAD: f64 = 3e-3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrivenBody {
     follower: PoseFollower,
+    /// Where it is to go, whether or not it may.
+    wanted: Isometry3<f64>,
     /// Where the follower goes; inside the limits.
     target: Isometry3<f64>,
     drive: Option<Drive>,
@@ -40,7 +42,8 @@ impl DrivenBody {
     /// Takes over a moving reference, and brings it to rest.
     pub fn new(reference: PoseReference, omega: f64, limits: RateLimits) -> Self {
         let follower = PoseFollower::new(reference, omega, limits);
-        Self { target: follower.stopping_pose(), follower, drive: None }
+        let stop = follower.stopping_pose();
+        Self { wanted: stop, target: stop, follower, drive: None }
     }
 
     /// Where it should be now.
@@ -56,7 +59,8 @@ impl DrivenBody {
     /// Lets go: comes to rest as soon as it can.
     pub fn release(&mut self) {
         if self.drive.take().is_some() {
-            self.target = self.follower.stopping_pose();
+            self.wanted = self.follower.stopping_pose();
+            self.target = self.wanted;
         }
     }
 
@@ -85,7 +89,8 @@ impl DrivenBody {
         });
     }
 
-    /// One control step. `permitted` takes a wanted target to the nearest one inside the limits.
+    /// One control step. `permitted` takes a wanted target to the nearest one inside the limits, which may
+    /// move: a body that nobody drives gives way to them, and comes back when they do.
     pub fn advance(
         &mut self,
         now_ns: u64,
@@ -96,12 +101,12 @@ impl DrivenBody {
             let now = drive.ramp.at_time(now_ns);
             let translation = now.translation.vector - drive.first.translation.vector;
             let rotation = now.rotation * drive.first.rotation.inverse();
-            let wanted = Isometry3::from_parts(
+            self.wanted = Isometry3::from_parts(
                 Translation3::from(drive.anchor.translation.vector + translation),
                 rotation * drive.anchor.rotation,
             );
-            self.target = permitted(&wanted);
         }
+        self.target = permitted(&self.wanted);
         self.follower.follow(&self.target, dt_s);
     }
 
@@ -113,11 +118,14 @@ impl DrivenBody {
         dt_s: f64,
         mut permitted: impl FnMut(&Isometry3<f64>) -> Isometry3<f64>,
     ) {
-        let Some(drive) = &self.drive else { return self.follower.follow(&self.target, dt_s) };
+        let Some(drive) = &self.drive else {
+            self.target = permitted(&self.wanted);
+            return self.follower.follow(&self.target, dt_s);
+        };
         let motion = displacement.displacing(&drive.anchor);
-        let wanted = self.follower.stopping_pose_of(&motion);
-        self.target = permitted(&wanted);
-        let lead = Lead { motion, share: share_inside(&wanted, &self.target) };
+        self.wanted = self.follower.stopping_pose_of(&motion);
+        self.target = permitted(&self.wanted);
+        let lead = Lead { motion, share: share_inside(&self.wanted, &self.target) };
         self.follower.follow_led(&self.target, Some(&lead), dt_s);
     }
 }

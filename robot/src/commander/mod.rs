@@ -28,4 +28,4 @@ pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
 pub use reach::Reach;
 pub use reference::{PoseReference, rebased_point};
-pub use support::{from_above, push_inside};
+pub use support::{deepest_margin, from_above, push_inside};

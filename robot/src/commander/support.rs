@@ -35,6 +35,21 @@ pub fn push_inside(point: &Vector2<f64>, feet: &[Vector2<f64>], margin_m: f64) -
     inside - point
 }
 
+/// The greatest margin that a point can have inside the triangle of three feet: the radius of its incircle,
+/// twice its area by its circumference. Nothing with fewer feet; of four, the best of their triangles.
+pub fn deepest_margin(feet: &[Vector2<f64>]) -> f64 {
+    let mut deepest: f64 = 0.0;
+    for (i, a) in feet.iter().enumerate() {
+        for (j, b) in feet.iter().enumerate().skip(i + 1) {
+            for c in &feet[j + 1..] {
+                let circumference = (b - a).norm() + (c - b).norm() + (a - c).norm();
+                deepest = deepest.max((b - a).perp(&(c - a)).abs() / circumference.max(1e-9));
+            }
+        }
+    }
+    deepest
+}
+
 /// The point seen from above.
 pub fn from_above(point: &Vector3<f64>) -> Vector2<f64> {
     point.xy()
@@ -53,6 +68,15 @@ mod tests {
     #[test]
     fn a_point_well_inside_is_left_alone() {
         assert_eq!(push_inside(&Vector2::new(-0.1, 0.05), &tripod(), 0.02), Vector2::zeros());
+    }
+
+    #[test]
+    fn the_deepest_margin_is_the_incircles_radius() {
+        let [a, b, c] = tripod();
+        let hypotenuse = (a - b).norm();
+        let expected = ((a - c).norm() + (b - c).norm() - hypotenuse) / 2.0;
+        assert!((deepest_margin(&tripod()) - expected).abs() < 1e-12);
+        assert_eq!(deepest_margin(&tripod()[..2]), 0.0);
     }
 
     proptest! {

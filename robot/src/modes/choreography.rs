@@ -3,30 +3,37 @@
 //! Every motion begins at the reference as it is and moves (never at a measurement), so that phases may be
 //! interrupted by each other without a step.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::{
     driving::{Driving, Operator},
+    foot_path::{Descent, Lift},
     leg_return::LegReturn,
     mode::{Effector, Phase},
     posture_motion::PostureMotion,
     scene::Scene,
     setpoint::Setpoint,
     settings::{MotionSettings, PoseSettings},
+    shift::Shift,
+    touch_down::{Felt, TouchDown},
 };
 use crate::{
     commander::{Limits, PointMotion, PoseMotion, PoseReference},
     estimator::heading,
     joints::{JointVector, Leg, Side},
-    kinematics::torso_from_frame,
+    kinematics::{leg_towards, of_leg, torso_from_frame},
     model::Frame,
     wbc::PointReference,
 };
 
-/// Samples in a row that must feel the ground.
-const TOUCH_SAMPLES: u32 = 4;
 /// Share of the foot's lifting after which its arm unfolds: in the air.
 const UNFOLD_AFTER: f64 = 0.4;
+/// Time in which a foot takes up its speed towards the ground, s.
+const LOWER_RAMP_S: f64 = 0.1;
+/// Time in which a foot that goes down comes to above its landing point, s.
+const OVER_S: f64 = 0.4;
+/// Least duration of an arm's motion, s.
+const LEAST_ARM_S: f64 = 0.3;
 
 /// How far a phase has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -60,11 +67,15 @@ pub struct Choreography {
     posture: PostureMotion,
     torso: PoseMotion,
     arms: [PointMotion; 2],
-    foot: PointMotion,
+    shift: Shift,
+    lift: Lift,
     leg: LegReturn,
+    touch_down: TouchDown,
+    /// The foot that goes down is on the ground.
+    landed: bool,
+    /// Since when the foot that lifts is off the ground, s in the phase.
+    airborne_s: Option<f64>,
     driving: Driving,
-    /// Samples in a row that have felt the ground.
-    touching: u32,
 }
 
 impl Choreography {
@@ -77,10 +88,13 @@ impl Choreography {
             posture: PostureMotion::new(&stand, &stand, &stand, 1.0, 1.0),
             torso: PoseMotion::new(&PoseReference::hold(&identity), &identity, 1.0),
             arms: Side::ALL.map(|side| PointMotion::hold(poses.stow(side))),
-            foot: PointMotion::hold(Vector3::zeros()),
+            shift: Shift::none(),
+            lift: Lift::hold(Vector3::zeros()),
             leg: LegReturn::hold(poses.stand_rad),
+            touch_down: TouchDown::new(Descent::hold(Vector3::zeros())),
+            landed: false,
+            airborne_s: None,
             driving: Driving::new(limits, &stand),
-            touching: 0,
             phase: Phase::Damped,
             entered_ns: 0,
             poses,
@@ -136,7 +150,8 @@ impl Choreography {
     pub fn enter(&mut self, phase: Phase, scene: &Scene<'_>) {
         self.phase = phase;
         self.entered_ns = scene.now_ns;
-        self.touching = 0;
+        self.landed = false;
+        self.airborne_s = None;
         let MotionSettings { fold_s, stand_s, lie_down_s, .. } = self.motions;
         let fold = self.poses.posture(&self.poses.fold_rad);
         let stand = self.poses.posture(&self.poses.stand_rad);
@@ -154,8 +169,9 @@ impl Choreography {
             }
             Phase::Stance => self.driving.begin_stance(&self.setpoint),
             Phase::ShiftTorso(effector) => {
-                let shift = self.poses.shift(effector.side());
-                self.move_torso(&Isometry3::from_parts(shift.into(), UnitQuaternion::identity()));
+                self.shift = Shift::plan(&self.poses, scene, effector);
+                let goal = self.shift.torso;
+                self.move_torso(&goal);
                 self.stow_arms(scene);
             }
             Phase::LiftFoot(effector) => self.begin_lift(effector, scene),
@@ -170,32 +186,32 @@ impl Choreography {
         let side = effector.side();
         self.move_torso(&Isometry3::identity());
         let foot = self.foot_reference(side, scene);
-        let rise = (scene.landing(side).z + self.poses.lift_m - foot.position.z).max(0.0);
-        let up = foot.position + rise * Vector3::z();
-        self.foot = PointMotion::new(&foot, &up, self.motions.lift_s);
-        let arm = match effector {
-            Effector::Foot(side) => self.poses.stow(side),
-            Effector::Gripper(side) => self.poses.ready(side),
-        };
-        self.move_arm(side, &arm, scene);
+        let place = scene.landing(side) + self.poses.lift(effector) * Vector3::z();
+        self.lift = Lift::new(&foot, &place, self.motions.lift_s);
+        self.move_arm(side, &self.poses.arm(effector), scene);
     }
 
     fn begin_stow(&mut self, side: Side, scene: &Scene<'_>, stand: &JointVector) {
         self.move_torso(&Isometry3::identity());
         let foot = self.foot_reference(side, scene);
         let torso = self.setpoint.torso.pose();
-        let (hover_m, arm_s) = (self.poses.hover_m, self.motions.arm_s);
-        self.leg = LegReturn::new(scene, side, &foot, &torso, stand, hover_m, arm_s);
         self.move_arm(side, &self.poses.stow(side), scene);
+        let hover = scene.landing(side) + self.poses.hover_m * Vector3::z();
+        let goal = leg_towards(scene.model, stand, side.leg(), &hover);
+        let way = (goal - of_leg(scene.desired, side.leg())).amax();
+        // Arm and leg take the same time: the arm folds over the ground as the foot comes down to it.
+        let MotionSettings { torso_s, leg_rad_s, .. } = self.motions;
+        let duration_s = (way / leg_rad_s).max(torso_s).max(self.arms[side.index()].duration_s());
+        self.leg = LegReturn::new(scene, side, &foot, &torso, &goal, duration_s);
     }
 
     fn begin_lowering(&mut self, side: Side, scene: &Scene<'_>) {
         self.move_torso(&Isometry3::identity());
         let foot = self.foot_reference(side, scene);
-        let depth = self.poses.hover_m + self.motions.search_m;
-        let deepest = scene.landing(side) - self.motions.search_m * Vector3::z();
-        // The motion is fastest, 1.875 times its mean, about where the ground should be.
-        self.foot = PointMotion::new(&foot, &deepest, 1.875 * depth / self.motions.lower_m_s);
+        let MotionSettings { search_m, lower_m_s, .. } = self.motions;
+        let deepest = scene.landing(side) - search_m * Vector3::z();
+        let descent = Descent::new(&foot, &deepest, lower_m_s, LOWER_RAMP_S, OVER_S);
+        self.touch_down = TouchDown::new(descent);
     }
 
     /// One step of the phase that is on.
@@ -223,7 +239,7 @@ impl Choreography {
             }
             Phase::ShiftTorso(effector) => {
                 self.play(elapsed_s);
-                let may_lift = scene.may_lift(effector.side(), self.motions.lift_margin_m);
+                let may_lift = self.shift.may_lift(scene, effector, self.motions.lift_margin_m);
                 Progress::on_four_feet(self.torso.is_over(elapsed_s) && may_lift)
             }
             Phase::LiftFoot(effector) => self.lift(effector, elapsed_s, load_step),
@@ -234,7 +250,7 @@ impl Choreography {
             Phase::Stow(side) => {
                 let foot = self.leg.sample(scene, elapsed_s, |at_s| self.torso.sample(at_s).pose());
                 self.play_lifted(side, elapsed_s, elapsed_s, foot);
-                Progress::on_three_feet(elapsed_s >= self.motions.arm_s)
+                Progress::on_three_feet(elapsed_s >= self.leg.duration_s())
             }
             Phase::LowerFoot(side) => self.lower(side, elapsed_s, load_step, scene),
         }
@@ -242,7 +258,6 @@ impl Choreography {
 
     /// Unloads the foot, then lifts it and unfolds the arm.
     fn lift(&mut self, effector: Effector, elapsed_s: f64, load_step: f64) -> Progress {
-        let MotionSettings { load_s, lift_s, arm_s, .. } = self.motions;
         let (side, leg) = (effector.side(), effector.side().leg());
         if self.setpoint.contacts.contains(leg) {
             self.setpoint.torso = self.torso.sample(elapsed_s);
@@ -251,25 +266,23 @@ impl Choreography {
         if self.setpoint.contacts.contains(leg) {
             return Progress::default();
         }
-        let lifting_s = elapsed_s - load_s;
-        let foot = self.foot.sample(lifting_s);
-        self.play_lifted(side, elapsed_s, lifting_s - UNFOLD_AFTER * lift_s, foot);
-        let over_s = match effector {
-            Effector::Foot(_) => lift_s,
-            Effector::Gripper(_) => UNFOLD_AFTER * lift_s + arm_s,
-        };
-        Progress::on_three_feet(lifting_s >= over_s)
+        let lifting_s = elapsed_s - *self.airborne_s.get_or_insert(elapsed_s);
+        let unfolding_s = lifting_s - UNFOLD_AFTER * self.motions.lift_s;
+        self.play_lifted(side, elapsed_s, unfolding_s, self.lift.sample(lifting_s));
+        let arm_s = self.arms[side.index()].duration_s();
+        let over =
+            self.torso.is_over(elapsed_s) && lifting_s >= self.lift.duration_s() && unfolding_s >= arm_s;
+        Progress::on_three_feet(over)
     }
 
     /// Lowers the foot until it feels the ground, then loads it.
     fn lower(&mut self, side: Side, elapsed_s: f64, load_step: f64, scene: &Scene<'_>) -> Progress {
         let leg = side.leg();
-        if self.touching < TOUCH_SAMPLES {
-            self.play_lifted(side, elapsed_s, f64::INFINITY, self.foot.sample(elapsed_s));
-            let felt = scene.foot_force[leg.index()] > self.motions.touch_n;
-            self.touching = if felt { self.touching + 1 } else { 0 };
-            let no_ground = elapsed_s >= self.foot.duration_s();
-            return Progress { no_ground, ..Progress::on_three_feet(false) };
+        if !self.landed {
+            let (foot, felt) = self.touch_down.step(scene, leg, self.motions.touch_n);
+            self.play_lifted(side, elapsed_s, f64::INFINITY, foot);
+            self.landed = felt == Felt::Ground;
+            return Progress { no_ground: felt == Felt::NoGround, ..Progress::on_three_feet(false) };
         }
         self.setpoint.stand();
         self.setpoint.hold_arm(side, PointReference::hold(self.poses.stow(side)));
@@ -312,7 +325,9 @@ impl Choreography {
     fn move_arm(&mut self, side: Side, goal: &Vector3<f64>, scene: &Scene<'_>) {
         let desired = PointReference::hold(scene.desired_arm(side));
         let start = self.setpoint.arm(side).copied().unwrap_or(desired);
-        self.arms[side.index()] = PointMotion::new(&start, goal, self.motions.arm_s);
+        let way = (goal - start.position).amax() / std::f64::consts::PI;
+        let duration_s = (self.motions.arm_s * way).max(LEAST_ARM_S);
+        self.arms[side.index()] = PointMotion::new(&start, goal, duration_s);
     }
 
     /// Reference of a foot: its own if it has one, else where the desired joints take it.

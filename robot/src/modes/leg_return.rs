@@ -7,7 +7,7 @@ use super::scene::Scene;
 use crate::{
     commander::PointMotion,
     joints::{JointVector, Leg, Side},
-    kinematics::{leg_towards, of_leg, torso_from_frame},
+    kinematics::{of_leg, torso_from_frame},
     model::{Frame, Model},
     wbc::PointReference,
 };
@@ -31,27 +31,28 @@ impl LegReturn {
         Self { leg: Leg::FrontRight, joints: PointMotion::hold(leg_rad), offset: nothing }
     }
 
-    /// From the foot's reference to `hover_m` above its landing point, where the foot is when the torso is at
-    /// the world's origin. `stand` is the posture from which the goal's joint angles are sought.
+    /// From the foot's reference to where the leg's joints take it at `goal`.
     pub fn new(
         scene: &Scene<'_>,
         side: Side,
         foot: &PointReference,
         world_from_torso: &Isometry3<f64>,
-        stand: &JointVector,
-        hover_m: f64,
+        goal: &Vector3<f64>,
         duration_s: f64,
     ) -> Self {
         let leg = side.leg();
-        let hover = scene.landing(side) + Vector3::z() * hover_m;
-        let goal = leg_towards(scene.model, stand, leg, &hover);
         let start = PointReference::hold(of_leg(scene.desired, leg));
         let offset = foot.position - place(scene.model, scene.desired, leg, world_from_torso);
         Self {
             leg,
-            joints: PointMotion::new(&start, &goal, duration_s),
+            joints: PointMotion::new(&start, goal, duration_s),
             offset: PointMotion::new(&PointReference::hold(offset), &Vector3::zeros(), duration_s),
         }
+    }
+
+    /// How long it takes, s.
+    pub fn duration_s(&self) -> f64 {
+        self.joints.duration_s()
     }
 
     /// The foot's reference in the world; `torso_at` is the torso's reference after some time.

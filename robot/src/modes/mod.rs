@@ -14,6 +14,7 @@
 
 mod choreography;
 mod driving;
+mod foot_path;
 mod leg_return;
 mod machine;
 mod mode;
@@ -21,7 +22,9 @@ mod posture_motion;
 mod scene;
 mod setpoint;
 mod settings;
+mod shift;
 pub mod table;
+mod touch_down;
 
 pub use choreography::{Choreography, Progress};
 pub use driving::{Driving, Operator};

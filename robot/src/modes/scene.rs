@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 use crate::{
-    commander::{from_above, push_inside},
+    commander::from_above,
     dynamics::State,
     joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
@@ -79,11 +79,5 @@ impl Scene<'_> {
             count += 1.0;
         }
         if count == 0.0 { f64::NEG_INFINITY } else { sum / count }
-    }
-
-    /// Whether the centre of mass is at least so far inside the feet that stay when one front foot lifts.
-    pub fn may_lift(&self, side: Side, margin_m: f64) -> bool {
-        let (feet, count) = self.standing_feet(&ContactSet::without(side.leg()));
-        push_inside(&from_above(&self.com), &feet[..count], margin_m) == Vector2::zeros()
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
+use super::mode::Effector;
 use crate::joints::{JointVector, Leg, Side};
 
 /// Named postures.
@@ -19,10 +20,14 @@ pub struct PoseSettings {
     pub left_ready_rad: Vector3<f64>,
     /// Torso's origin above the feet's centres in stance, m.
     pub stand_height_m: f64,
-    /// Shift of the torso before the right foot lifts (y mirrored for the left), m.
-    pub right_shift_m: Vector3<f64>,
+    /// How far the torso rises before a foot lifts, m.
+    pub rise_m: f64,
+    /// How far inside the other three feet the torso's shift brings the lifted robot's centre of mass, m.
+    pub shift_margin_m: f64,
     /// How far a foot is lifted for its gripper, m.
     pub lift_m: f64,
+    /// How far a foot is lifted for its own sake, m.
+    pub foot_lift_m: f64,
     /// Height from which a foot is lowered, m.
     pub hover_m: f64,
 }
@@ -35,9 +40,11 @@ impl Default for PoseSettings {
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
             stand_height_m: 0.265,
-            right_shift_m: Vector3::new(-0.05, 0.03, 0.04),
+            rise_m: 0.04,
+            shift_margin_m: 0.05,
             lift_m: 0.12,
-            hover_m: 0.05,
+            foot_lift_m: 0.08,
+            hover_m: 0.04,
         }
     }
 }
@@ -53,12 +60,19 @@ impl PoseSettings {
         mirrored(&self.left_ready_rad, side)
     }
 
-    /// Shift of the torso before a foot lifts.
-    pub fn shift(&self, side: Side) -> Vector3<f64> {
-        let [x, y, z] = self.right_shift_m.into();
-        match side {
-            Side::Right => Vector3::new(x, y, z),
-            Side::Left => Vector3::new(x, -y, z),
+    /// The posture of the lifted leg's arm in which a mode begins.
+    pub fn arm(&self, effector: Effector) -> Vector3<f64> {
+        match effector {
+            Effector::Foot(side) => self.stow(side),
+            Effector::Gripper(side) => self.ready(side),
+        }
+    }
+
+    /// How far above its landing point a foot is when a mode begins, m.
+    pub fn lift(&self, effector: Effector) -> f64 {
+        match effector {
+            Effector::Foot(_) => self.foot_lift_m,
+            Effector::Gripper(_) => self.lift_m,
         }
     }
 
@@ -103,8 +117,10 @@ pub struct MotionSettings {
     pub load_s: f64,
     /// Duration of lifting, s.
     pub lift_s: f64,
-    /// Duration of folding and unfolding an arm, s.
+    /// Duration of folding and unfolding an arm by half a turn, s; shorter ways take less.
     pub arm_s: f64,
+    /// Greatest mean speed of the joints of a leg that goes back to above its landing point, rad/s.
+    pub leg_rad_s: f64,
     /// Speed of a foot towards the ground, m/s.
     pub lower_m_s: f64,
     /// Vertical force that tells that a foot has landed, N.
@@ -123,12 +139,13 @@ impl Default for MotionSettings {
             fold_s: 1.2,
             stand_s: 1.8,
             settle_s: 0.3,
-            torso_s: 1.0,
+            torso_s: 0.8,
             torso_m_s: 0.1,
             torso_rad_s: 0.3,
             load_s: 0.4,
-            lift_s: 1.0,
-            arm_s: 2.0,
+            lift_s: 0.7,
+            arm_s: 1.6,
+            leg_rad_s: 1.0,
             lower_m_s: 0.05,
             touch_n: 8.0,
             search_m: 0.04,
