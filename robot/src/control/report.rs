@@ -61,6 +61,7 @@ impl Controller {
             opening: sensors.opening,
             foot_force: sensors.foot_force,
             world_resets: self.estimator.resets(),
+            slips: self.estimator.slips(),
             torso: BodyState { pose: torso, target: torso_target },
             grippers: Side::ALL.map(gripper),
             feet: Side::ALL.map(foot),

@@ -64,6 +64,8 @@ pub struct Snapshot {
     pub foot_force: [f64; 4],
     /// How often the world was set anew.
     pub world_resets: u64,
+    /// How often a standing foot was found to slip.
+    pub slips: u64,
     /// Torso.
     pub torso: BodyState,
     /// Grippers right, left.
@@ -99,6 +101,7 @@ impl Snapshot {
             opening: [0.0; 2],
             foot_force: [0.0; 4],
             world_resets: 0,
+            slips: 0,
             torso: nowhere,
             grippers: [nowhere; 2],
             feet: [nowhere; 2],
