@@ -132,11 +132,15 @@ pub fn leg_towards(
     foot_in_torso: &Vector3<f64>,
 ) -> Vector3<f64> {
     const STEPS: usize = 40;
+    const TOLERANCE_M: f64 = 1e-6;
     const DAMPING: f64 = 1e-5;
     let mut joints = *start;
     for _ in 0..STEPS {
         let foot = FootKinematics::new(model, &joints, leg);
         let error = foot_in_torso - foot.position();
+        if error.norm() < TOLERANCE_M {
+            break;
+        }
         let hessian = foot.linear.tr_mul(&foot.linear) + DAMPING * Matrix3::identity();
         let step = hessian.cholesky().map_or_else(Vector3::zeros, |f| f.solve(&foot.linear.tr_mul(&error)));
         for column in 0..3 {
