@@ -38,7 +38,8 @@ enum Command {
 
 #[derive(clap::Args)]
 struct EvalArgs {
-    /// Which one: `vision`, `tracking`, `robustness`; `demo` judges the recording of the last headless demo.
+    /// Which one: `vision`, `tracking`, `workspace`, `robustness`; `demo` judges the recording of the last
+    /// headless demo.
     name: String,
     /// Another seed than the published one.
     #[arg(long)]

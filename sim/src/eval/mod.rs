@@ -12,6 +12,7 @@ pub mod robustness;
 pub mod statistics;
 pub mod tracking;
 pub mod vision;
+pub mod workspace;
 
 use std::path::{Path, PathBuf};
 
@@ -48,6 +49,8 @@ pub enum Experiment {
     Tracking(tracking::Args),
     /// Unreachable and singular targets, pushes, loads, slippery feet, lost commands: does it fall or shake?
     Robustness(robustness::Args),
+    /// How much more the arms reach than the feet: the paper's table, in several definitions.
+    Workspace,
 }
 
 /// Runs `locoman-sim eval`.
@@ -58,6 +61,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::Workspace => workspace::run(configs, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,
     };
     report.finish(args.json.as_deref())
