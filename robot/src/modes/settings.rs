@@ -41,7 +41,7 @@ impl Default for PoseSettings {
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
             stand_height_m: 0.265,
             rise_m: 0.04,
-            shift_margin_m: 0.05,
+            shift_margin_m: 0.07,
             lift_m: 0.12,
             foot_lift_m: 0.08,
             hover_m: 0.04,

@@ -166,8 +166,8 @@ impl Default for WbcSettings {
         };
         Self {
             objectives: ObjectiveGains {
-                torso_position: gains(100.0, 1.0, 0.05, 10.0, 0.05),
-                torso_orientation: gains(100.0, 1.0, 0.3, 10.0, 0.05),
+                torso_position: gains(100.0, 10.0, 0.05, 10.0, 0.05),
+                torso_orientation: gains(100.0, 10.0, 0.3, 10.0, 0.05),
                 foot_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_orientation: gains(100.0, 10.0, 0.3, 30.0, 0.05),
