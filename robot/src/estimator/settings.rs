@@ -42,7 +42,7 @@ impl Default for EstimatorSettings {
     fn default() -> Self {
         Self {
             foot_radius_m: 0.02,
-            foot_sink_m_n: 1.0e-5,
+            foot_sink_m_n: 1.75e-5,
             full_trust_n: 15.0,
             imu_tilt_s: 0.1,
             feet_attitude_s: 0.1,
