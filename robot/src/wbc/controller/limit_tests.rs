@@ -2,7 +2,7 @@
 //! too much.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::RngSeed};
 
 use super::*;
 use crate::{
@@ -147,7 +147,13 @@ impl Plant {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    // Bounds of a closed loop, not laws: the same motions each time.
+    #![proptest_config(ProptestConfig {
+        cases: 48,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(1),
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn whatever_the_gripper_is_asked_for_limits_are_kept_smoothly_and_left_again(
