@@ -72,8 +72,17 @@ fn places(table: &mut String, findings: &Findings) {
 fn trajectories(report: &mut Report, table: &mut String, outcomes: &[wander::Outcome]) {
     let _ = writeln!(
         table,
-        "{:12} {:>5}  {FINDINGS_HEAD}  {:>8} {:>7} {:>7} {:>7} {:>9} {:>9} {:>8}",
-        "trajectories", "count", "withheld", "error", "max", "tremor", "back, mm", "back, rad", "jerk"
+        "{:12} {:>5}  {FINDINGS_HEAD}  {:>8} {:>7} {:>7} {:>7} {:>9} {:>9} {:>8} {:>9}",
+        "trajectories",
+        "count",
+        "withheld",
+        "error",
+        "max",
+        "tremor",
+        "back, mm",
+        "back, rad",
+        "jerk",
+        "recovered"
     );
     let kinds = Kind::ALL.into_iter().map(Some).chain([None]);
     for kind in kinds {
@@ -100,10 +109,13 @@ fn trajectories(report: &mut Report, table: &mut String, outcomes: &[wander::Out
         ];
         let _ = write!(table, "{name:12} {:5}  ", of_kind.len());
         findings(table, &found);
+        let recovered = of_kind.iter().filter(|outcome| outcome.has_recovered()).count();
+        let share = recovered as f64 / of_kind.len() as f64;
         let [withheld, error, worst, tremor, back_mm, back_rad, jerk] = figures.map(|(_, value, _)| value);
         let _ = writeln!(
             table,
-            "  {withheld:8.1} {error:7.2} {worst:7.1} {tremor:7.2} {back_mm:9.2} {back_rad:9.4} {jerk:8.0}"
+            "  {withheld:8.1} {error:7.2} {worst:7.1} {tremor:7.2} {back_mm:9.2} {back_rad:9.4} {jerk:8.0} {:8.1}%",
+            100.0 * share
         );
         places(table, &found);
         let prefix = format!("trajectories.{name}");
@@ -112,6 +124,7 @@ fn trajectories(report: &mut Report, table: &mut String, outcomes: &[wander::Out
         for (what, value, unit) in figures {
             report.push(Figure::new(format!("{prefix}.{what}"), value, unit));
         }
+        report.push(Figure::new(format!("{prefix}.recovered_share"), share, ""));
         report.push(Figure::new(
             format!("{prefix}.tremor_p99"),
             percentile(&all(|o| o.tremor_mm), 0.99),

@@ -37,6 +37,14 @@ pub struct Outcome {
     pub recovery: Option<(f64, f64)>,
 }
 
+impl Outcome {
+    /// Whether the true gripper is back at its start, to 5 mm and 0.05 rad: not in another posture of the limb,
+    /// from which the limits bar the way.
+    pub fn has_recovered(&self) -> bool {
+        self.recovery.is_some_and(|(mm, rad)| mm < 5.0 && rad < 0.05)
+    }
+}
+
 /// Plays the trajectories of some seeds on one robot; after a fall on another one.
 pub fn wander(configs: &Path, profile: &str, seeds: &[u64]) -> anyhow::Result<Vec<Outcome>> {
     let config = RobotConfig::load(configs)?;
