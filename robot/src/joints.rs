@@ -36,6 +36,15 @@ impl Leg {
     pub const fn first_joint(self) -> usize {
         3 * self as usize
     }
+
+    /// The side of a front leg: that of the arm which it carries.
+    pub const fn side(self) -> Option<Side> {
+        match self {
+            Self::FrontRight => Some(Side::Right),
+            Self::FrontLeft => Some(Side::Left),
+            Self::RearRight | Self::RearLeft => None,
+        }
+    }
 }
 
 /// A side of the body: a loco-manipulator and the front leg that carries it.

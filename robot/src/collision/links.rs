@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::joints::{Leg, Side};
+use crate::joints::Leg;
 
 /// A kind of link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
@@ -81,7 +81,7 @@ impl Link {
         let trunk = (part == Part::Trunk).then_some(Self { part, leg: None });
         let limbs = Leg::ALL
             .into_iter()
-            .filter(move |leg| part != Part::Trunk && (!part.is_front_only() || side_of(*leg).is_some()));
+            .filter(move |leg| part != Part::Trunk && (!part.is_front_only() || leg.side().is_some()));
         trunk.into_iter().chain(limbs.map(move |leg| Self { part, leg: Some(leg) }))
     }
 
@@ -91,7 +91,7 @@ impl Link {
         match self.part.depth() {
             0 => None,
             depth @ 1..=3 => Some(leg.first_joint() + depth - 1),
-            depth => side_of(leg).map(|side| side.first_arm_joint() + depth - 4),
+            depth => leg.side().map(|side| side.first_arm_joint() + depth - 4),
         }
     }
 
@@ -131,11 +131,6 @@ impl std::fmt::Display for Link {
     }
 }
 
-/// The side of a front leg.
-fn side_of(leg: Leg) -> Option<Side> {
-    Side::ALL.into_iter().find(|side| side.leg() == leg)
-}
-
 /// Whether two links are to be kept apart.
 ///
 /// What moves is a front limb beyond its hip. Left out are neighbours, links with one joint's range between
@@ -143,7 +138,7 @@ fn side_of(leg: Leg) -> Option<Side> {
 /// samples those. Rear legs always stand: they are obstacles for the front limbs, not for each other.
 pub(super) fn can_meet(first: Link, second: Link) -> bool {
     [(first, second), (second, first)].into_iter().any(|(moving, other)| {
-        let is_front = moving.leg.is_some_and(|leg| side_of(leg).is_some());
+        let is_front = moving.leg.is_some_and(|leg| leg.side().is_some());
         is_front && meets(moving, other)
     })
 }
@@ -162,7 +157,7 @@ fn meets(moving: Link, other: Link) -> bool {
             Mount | Forearm | Wrist | Gripper => false,
         };
     }
-    if side_of(leg).is_some() {
+    if leg.side().is_some() {
         return (beyond_knee || part == Thigh) && met != Hip || part == Motor && met == Thigh;
     }
     beyond_knee && (met == Calf || other.is_left() == moving.is_left())

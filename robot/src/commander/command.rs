@@ -54,6 +54,23 @@ pub struct Command {
 }
 
 impl Command {
+    /// Of a sender that asks for nothing.
+    pub const fn idle(source: u64) -> Self {
+        Self {
+            source,
+            sequence: 0,
+            capture_ns: 0,
+            received_ns: 0,
+            engagement: 0,
+            torso: None,
+            palms: [None; 2],
+            opening: [None; 2],
+            mode_request: 0,
+            mode: None,
+            trajectory: None,
+        }
+    }
+
     /// From a message that [`locoman_protocol::validate()`] accepted. Poses that are none count as absent.
     pub fn from_message(message: &OperatorCommand, received_ns: u64) -> Self {
         let pose = |pose: &Option<messages::Pose>| pose.as_ref().and_then(|pose| isometry(pose).ok());

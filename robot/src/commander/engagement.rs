@@ -75,19 +75,7 @@ mod tests {
     use super::*;
 
     fn command(source: u64, engagement: u64) -> Command {
-        Command {
-            source,
-            sequence: 1,
-            capture_ns: 0,
-            received_ns: 0,
-            engagement,
-            torso: None,
-            palms: [None; 2],
-            opening: [None; 2],
-            mode_request: 0,
-            mode: None,
-            trajectory: None,
-        }
+        Command { sequence: 1, engagement, ..Command::idle(source) }
     }
 
     #[test]

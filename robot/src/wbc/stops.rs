@@ -154,7 +154,7 @@ impl Stops {
             if !around.objectives.iter().any(lands) {
                 self.limit_height(around, Frame::Foot(leg), leg, ground + around.settings.foot_clearance);
             }
-            if let Some(side) = side_of(leg) {
+            if let Some(side) = leg.side() {
                 self.limit_height(
                     around,
                     Frame::Gripper(side),
@@ -228,7 +228,7 @@ impl Stops {
     /// The joints that a leg's limb can move without moving anything else; the first are those of the leg itself.
     fn free_joints(&self, leg: Leg) -> impl Iterator<Item = usize> {
         let of_leg = leg.first_joint()..leg.first_joint() + if self.lifted[leg.index()] { 3 } else { 0 };
-        let arm = side_of(leg).map(Side::first_arm_joint);
+        let arm = leg.side().map(Side::first_arm_joint);
         of_leg.chain(arm.into_iter().flat_map(|first| first..first + 3))
     }
 
@@ -412,11 +412,6 @@ fn metric_of(around: &Surroundings, joints: &[Option<usize>; 6]) -> Matrix6<f64>
         }
     }
     metric
-}
-
-/// The side of a front leg.
-fn side_of(leg: Leg) -> Option<Side> {
-    Side::ALL.into_iter().find(|side| side.leg() == leg)
 }
 
 /// Mean height of the standing feet's centres; nothing without any.

@@ -41,19 +41,7 @@ impl Lockstep {
     pub fn with_config(configs: &Path, config: RobotConfig, options: &Options) -> anyhow::Result<Self> {
         let mut plant = LockstepPlant::new(configs, options)?;
         let controller = Controller::new(config, ControlOptions { auto_stand: true });
-        let operator = Command {
-            source: 1,
-            sequence: 0,
-            capture_ns: 0,
-            received_ns: 0,
-            engagement: 0,
-            torso: None,
-            palms: [None; 2],
-            opening: [None; 2],
-            mode_request: 0,
-            mode: None,
-            trajectory: None,
-        };
+        let operator = Command::idle(1);
         let (command, truth) = (*controller.command(), plant.truth());
         Ok(Self { plant, controller, command, sensors: None, operator, truth, ticks: 0, silent: false })
     }

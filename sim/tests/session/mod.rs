@@ -126,17 +126,10 @@ impl Session {
     /// An operator appears, engaged with nothing.
     pub fn join(&mut self) {
         self.operator = Some(Command {
-            source: 7,
             sequence: 1,
             capture_ns: self.time_ns,
             received_ns: self.time_ns,
-            engagement: 0,
-            torso: None,
-            palms: [None; 2],
-            opening: [None; 2],
-            mode_request: 0,
-            mode: None,
-            trajectory: None,
+            ..Command::idle(7)
         });
         self.run(0.05);
     }
