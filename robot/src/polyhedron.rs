@@ -13,8 +13,6 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-/// The most constraints.
-const MOST: usize = 48;
 /// The most that act at once.
 const MOST_ACTIVE: usize = 12;
 /// ρ, against rows of about length 1 in z: what is permitted is exceeded by a millionth of the multiplier.
@@ -27,14 +25,17 @@ const TOLERANCE: f64 = 1e-9;
 /// Constraints a_i · d ≥ b_i on a limb's motion.
 #[derive(Debug, Clone)]
 pub(crate) struct Polyhedron {
-    rows: [Vector6<f64>; MOST],
-    bounds: [f64; MOST],
+    rows: [Vector6<f64>; Self::MOST],
+    bounds: [f64; Self::MOST],
     count: usize,
 }
 
 impl Polyhedron {
+    /// The most constraints.
+    pub(crate) const MOST: usize = 56;
+
     pub(crate) fn new() -> Self {
-        Self { rows: [Vector6::zeros(); MOST], bounds: [0.0; MOST], count: 0 }
+        Self { rows: [Vector6::zeros(); Self::MOST], bounds: [0.0; Self::MOST], count: 0 }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -43,7 +44,7 @@ impl Polyhedron {
 
     /// Adds a · d ≥ b.
     pub(crate) fn push(&mut self, row: Vector6<f64>, bound: f64) {
-        if self.count < MOST && bound.is_finite() {
+        if self.count < Self::MOST && bound.is_finite() {
             self.rows[self.count] = row;
             self.bounds[self.count] = bound;
             self.count += 1;
@@ -58,7 +59,7 @@ impl Polyhedron {
     /// The d nearest to 0 in the metric M; nothing if M is not positive definite.
     pub(crate) fn nearest(&self, metric: &Matrix6<f64>) -> Option<Vector6<f64>> {
         let lower = metric.cholesky()?.unpack();
-        let mut rows = [Vector6::zeros(); MOST];
+        let mut rows = [Vector6::zeros(); Self::MOST];
         let mut bounds = self.bounds;
         for (index, row) in self.rows[..self.count].iter().enumerate() {
             let mut z = *row;

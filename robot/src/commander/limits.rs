@@ -109,6 +109,8 @@ pub struct ReachRange {
     pub arm_1: Range,
     /// Least distance of links, m.
     pub clearance_m: f64,
+    /// Least height above the ground of links beyond the knee, m.
+    pub ground_m: f64,
 }
 
 /// Everything in `limits.toml`.
@@ -135,10 +137,6 @@ pub struct Limits {
     pub opening_per_s: f64,
     /// The centre of mass stays this far inside the feet's polygon, m.
     pub support_margin_m: f64,
-    /// A foot in the air stays this far above where it would touch the ground, m.
-    pub foot_clearance_m: f64,
-    /// A gripper's origin stays this far above the centres of the standing feet, m.
-    pub gripper_clearance_m: f64,
     /// Natural frequency of the critically damped follower of the operator's motion, rad/s.
     pub follower_rad_s: f64,
 }
@@ -172,6 +170,7 @@ impl Default for Limits {
                 calf: Range { min: -2.78, max: -0.95 },
                 arm_1: Range { min: -2.2, max: 1.7 },
                 clearance_m: 0.015,
+                ground_m: 0.015,
             },
             stance_torso_rate: RateLimits {
                 speed_m_s: 0.3,
@@ -193,8 +192,6 @@ impl Default for Limits {
             },
             opening_per_s: 4.0,
             support_margin_m: 0.02,
-            foot_clearance_m: 0.015,
-            gripper_clearance_m: 0.03,
             follower_rad_s: 40.0,
         }
     }

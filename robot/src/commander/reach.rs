@@ -2,21 +2,22 @@
 //!
 //! The whole-body controller puts a gripper's position above its orientation: were the target out of reach,
 //! it would give up all of the orientation for the last millimetre. So a target is first replaced by the pose
-//! nearest to it that six joints inside their ranges can take, off the robot itself, where both errors count:
+//! nearest to it that six joints inside their ranges can take, off the robot itself and above the ground, where
+//! both errors count:
 //!
 //! ```text
-//! minimize |p_t - p(q)|² + L² |log(R_t R(q)ᵀ)|²   over q in its box, links apart, |q̇| ≤ v
+//! minimize |p_t - p(q)|² + L² |log(R_t R(q)ᵀ)|²   over q in its box, links apart and above ground, |q̇| ≤ v
 //! ```
 //! by damped Gauss-Newton steps from the last solution, each brought to the nearest step that the limits permit
 //! ([`crate::polyhedron`]). With the joints' speed bounded, the solution is a path that the limb can follow.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
 use super::limits::{Range, ReachRange};
 use crate::{
-    collision::Clearances,
+    collision::{Clearances, Part},
     joints::{JointVector, Side},
-    kinematics::{GripperKinematics, body_poses},
+    kinematics::{Bodies, BodyPoses, GripperKinematics, body_poses},
     model::Model,
     polyhedron::Polyhedron,
 };
@@ -45,7 +46,24 @@ pub struct Reach {
     polyhedron: Polyhedron,
 }
 
-/// How a distance of two links depends on the six joints.
+/// What is above the ground: the points p of the torso's frame with n · p > offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfSpace {
+    /// n, upwards, of length 1.
+    pub normal: Vector3<f64>,
+    /// m
+    pub offset_m: f64,
+}
+
+impl HalfSpace {
+    /// Of a level ground at this height in the world.
+    pub fn above(world_from_torso: &Isometry3<f64>, height_m: f64) -> Self {
+        let normal = world_from_torso.rotation.inverse_transform_vector(&Vector3::z());
+        Self { normal, offset_m: height_m - world_from_torso.translation.z }
+    }
+}
+
+/// How a distance, of two links or of one from the ground, depends on the six joints.
 #[derive(Debug, Clone, Copy)]
 struct Wall {
     /// What is left of it, m.
@@ -54,8 +72,10 @@ struct Wall {
     slope: Vector6<f64>,
 }
 
-/// The most that are looked at.
-const WALLS: usize = crate::collision::MOST_NEAR;
+/// Links that can touch the ground: beyond the knee.
+const GROUNDED: [Part; 5] = [Part::Calf, Part::Mount, Part::Forearm, Part::Wrist, Part::Gripper];
+/// The most walls that are looked at: with the six joints' ends as many as the polyhedron takes.
+const WALLS: usize = Polyhedron::MOST - 12;
 
 impl Reach {
     /// Starts at these joint angles.
@@ -73,12 +93,13 @@ impl Reach {
         }
     }
 
-    /// The nearest pose to `torso_from_target` that can be reached by now; the other limbs are at `others`.
-    /// Allocates nothing.
+    /// The nearest pose to `torso_from_target` that can be reached by now; the other limbs are at `others`, the
+    /// ground is below `ground`. Allocates nothing.
     pub fn nearest(
         &mut self,
         model: &Model,
         others: &JointVector,
+        ground: &HalfSpace,
         torso_from_target: &Isometry3<f64>,
         dt_s: f64,
     ) -> Isometry3<f64> {
@@ -89,25 +110,70 @@ impl Reach {
         }
         self.joints = posture;
         let mut walls = [Wall { room: 0.0, slope: Vector6::zeros() }; WALLS];
-        let count = self.walls(model, &now.joints, &mut walls);
+        let count = self.walls(model, &now.joints, ground, &mut walls);
         for _ in 0..STEPS {
             self.step(model, torso_from_target, &mut walls[..count], dt_s / STEPS as f64);
         }
         GripperKinematics::new(model, &self.joints, self.side).torso_from_gripper
     }
 
-    /// Finds the links that are near this limb's.
-    fn walls(&mut self, model: &Model, joints: &[usize; 6], walls: &mut [Wall; WALLS]) -> usize {
+    /// Finds what this limb's links are near.
+    fn walls(
+        &mut self,
+        model: &Model,
+        joints: &[usize; 6],
+        ground: &HalfSpace,
+        walls: &mut [Wall; WALLS],
+    ) -> usize {
         let bodies = body_poses(model, &self.joints);
         let pairs = model.collision.pairs_of(self.side);
         let clearance_m = self.range.clearance_m;
         self.clearances.update(&model.collision, pairs, &bodies, clearance_m + INFLUENCE_M);
-        for (wall, near) in walls.iter_mut().zip(self.clearances.near()) {
+        let from_links = self.clearances.near().iter().map(|near| {
             let gradient = near.gradient(&bodies);
             let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
-            *wall = Wall { room: near.distance - clearance_m, slope };
+            Wall { room: near.distance - clearance_m, slope }
+        });
+        let from_ground = self.heights(model, joints, &bodies, ground);
+        let mut count = 0;
+        for (place, wall) in walls.iter_mut().zip(from_ground.chain(from_links)) {
+            *place = wall;
+            count += 1;
         }
-        self.clearances.near().len()
+        count
+    }
+
+    /// Both ends of each capsule that is near the ground.
+    fn heights(
+        &self,
+        model: &Model,
+        joints: &[usize; 6],
+        bodies: &BodyPoses,
+        ground: &HalfSpace,
+    ) -> impl Iterator<Item = Wall> {
+        let leg = Some(self.side.leg());
+        let shapes = model.collision.shapes().iter();
+        let of_limb =
+            shapes.filter(move |shape| shape.link.leg == leg && GROUNDED.contains(&shape.link.part));
+        of_limb.flat_map(|shape| [shape.capsule.a, shape.capsule.b].map(|end| (shape, end))).filter_map(
+            |(shape, end)| {
+                let moved_by = shape.link.joint()?;
+                let (rotation, origin) = bodies.pose(moved_by);
+                let point = rotation * end + origin;
+                let height = ground.normal.dot(&point) - ground.offset_m - shape.capsule.radius;
+                let room = height - self.range.ground_m;
+                let slope = Vector6::from_fn(|column, _| {
+                    let joint = joints[column];
+                    let (_, origin) = bodies.pose(joint);
+                    if joint <= moved_by {
+                        ground.normal.dot(&bodies.axis(joint).cross(&(point - origin)))
+                    } else {
+                        0.0
+                    }
+                });
+                (room < INFLUENCE_M).then_some(Wall { room, slope })
+            },
+        )
     }
 
     fn step(&mut self, model: &Model, target: &Isometry3<f64>, walls: &mut [Wall], dt_s: f64) {

@@ -5,6 +5,9 @@ use nalgebra::Isometry3;
 use super::Model;
 use crate::joints::{Leg, Side};
 
+/// Radius of a foot's sphere, m: a foot that stands has its centre so far above the ground.
+pub const FOOT_RADIUS_M: f64 = 0.02;
+
 /// A frame fixed to a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Frame {

@@ -5,12 +5,12 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 use super::{mode::Effector, scene::Scene, setpoint::Setpoint};
 use crate::{
     commander::{
-        Command, DrivenBody, FootReach, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
-        from_above, push_inside,
+        Command, DrivenBody, FootReach, Grip, HalfSpace, Limits, PoseReference, RateLimits, Reach,
+        SampleClock, from_above, push_inside,
     },
     joints::{JointVector, Side},
     kinematics::torso_from_frame,
-    model::Frame,
+    model::{FOOT_RADIUS_M, Frame},
     trajectory::{Player, Sample},
     wbc::RotationReference,
 };
@@ -204,7 +204,7 @@ impl Driving {
     /// The foot, within its box, above the ground, within reach.
     fn move_foot(&mut self, side: Side, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         let (range, start) = (self.limits.foot, self.limb_start);
-        let lowest = scene.ground(&setpoint.contacts) + self.limits.foot_clearance_m;
+        let lowest = scene.ground(&setpoint.contacts) + FOOT_RADIUS_M + self.limits.reach.ground_m;
         let (reach, world_from_torso) = (&mut self.foot_reach, setpoint.torso.pose());
         let permitted = |wanted: &Isometry3<f64>| {
             let mut position = range.clamp(&wanted.translation.vector, &start, side);
@@ -233,14 +233,13 @@ impl Driving {
         setpoint: &mut Setpoint,
     ) {
         let (range, start) = (self.limits.gripper, self.limb_start);
-        let lowest = self.lowest_gripper(side, scene, setpoint);
         let (reach, world_from_torso) = (&mut self.gripper_reach, setpoint.torso.pose());
+        let ground = HalfSpace::above(&world_from_torso, scene.ground(&setpoint.contacts));
         let permitted = |wanted: &Isometry3<f64>| {
-            let mut position = range.clamp(&wanted.translation.vector, &start, side);
-            position.z = position.z.max(lowest);
+            let position = range.clamp(&wanted.translation.vector, &start, side);
             let inside = Isometry3::from_parts(position.into(), wanted.rotation);
-            world_from_torso
-                * reach.nearest(scene.model, scene.desired, &world_from_torso.inv_mul(&inside), scene.dt_s)
+            let target = world_from_torso.inv_mul(&inside);
+            world_from_torso * reach.nearest(scene.model, scene.desired, &ground, &target, scene.dt_s)
         };
         match played {
             Some(sample) => {
@@ -251,22 +250,5 @@ impl Driving {
             None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
         }
         setpoint.grasp(side, *self.limb.reference());
-    }
-
-    /// Lowest height of a gripper's target at which neither it nor the foot behind it touches the ground.
-    ///
-    /// Leg and arm have just six joints, so gripper and foot rise and fall together: what room both have left
-    /// now is what the gripper may go down from here.
-    fn lowest_gripper(&self, side: Side, scene: &Scene<'_>, setpoint: &Setpoint) -> f64 {
-        let height = |frame| {
-            let torso_from_frame = torso_from_frame(scene.model, scene.desired, frame);
-            (setpoint.torso.pose() * torso_from_frame).translation.z
-        };
-        // A foot at this height touches the ground.
-        let ground = scene.ground(&setpoint.contacts);
-        let gripper = height(Frame::Gripper(side));
-        let foot_room = height(Frame::Foot(side.leg())) - ground - self.limits.foot_clearance_m;
-        let gripper_room = gripper - ground - self.limits.gripper_clearance_m;
-        gripper - foot_room.min(gripper_room)
     }
 }

@@ -7,7 +7,7 @@ use crate::{
     dynamics::State,
     joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
-    model::{Frame, Model},
+    model::{FOOT_RADIUS_M, Frame, Model},
     wbc::ContactSet,
 };
 
@@ -71,13 +71,13 @@ impl Scene<'_> {
         (feet, count)
     }
 
-    /// Mean height of the centres of the feet that stand; without any there is no ground.
+    /// Height of the ground under the feet that stand, in their mean; without any there is no ground.
     pub fn ground(&self, contacts: &ContactSet) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for leg in contacts.legs() {
             sum += self.foot(leg).z;
             count += 1.0;
         }
-        if count == 0.0 { f64::NEG_INFINITY } else { sum / count }
+        if count == 0.0 { f64::NEG_INFINITY } else { sum / count - FOOT_RADIUS_M }
     }
 }
