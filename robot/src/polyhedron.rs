@@ -32,7 +32,7 @@ pub(crate) struct Polyhedron {
 
 impl Polyhedron {
     /// The most constraints.
-    pub(crate) const MOST: usize = 56;
+    pub(crate) const MOST: usize = 72;
 
     pub(crate) fn new() -> Self {
         Self { rows: [Vector6::zeros(); Self::MOST], bounds: [0.0; Self::MOST], count: 0 }

@@ -5,11 +5,12 @@
 use std::path::{Path, PathBuf};
 
 use locoman_robot::{
-    collision::{Capsule, Clearances, CollisionModel, Link, Part, separation},
+    collision::{Altitude, Capsule, Clearances, CollisionModel, Ground, Link, Part, separation},
     joints::{JointVector, Leg},
     kinematics::{Bodies, BodyPoses, body_poses},
     model::Model,
 };
+use nalgebra::Isometry3;
 use proptest::prelude::*;
 
 fn configs() -> PathBuf {
@@ -218,5 +219,52 @@ fn shapes_that_make_no_sense_are_refused_by_name() {
     ] {
         let error = refusal("collision", from, to);
         assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// The ground 0.3 m under a tilted torso, and how far the front right limb is above it.
+fn altitudes(model: &Model, joints: &JointVector, tilt: &Isometry3<f64>) -> (Ground, Vec<Altitude>) {
+    let ground = Ground::at(-0.3, tilt);
+    let limb = ground.altitudes(Leg::FrontRight, &model.collision, &body_poses(model, joints)).collect();
+    (ground, limb)
+}
+
+#[test]
+fn a_foot_is_the_lowest_of_a_standing_leg() {
+    let model = model();
+    let mut joints = JointVector::zeros();
+    joints.fixed_rows_mut::<3>(0).copy_from_slice(&[0.0, 0.9, -1.8]);
+    let (_, limb) = altitudes(&model, &joints, &Isometry3::identity());
+    let lowest = |part| {
+        let of_part = limb.iter().filter(|end| end.link.part == part);
+        of_part.map(|end| end.height).fold(f64::INFINITY, f64::min)
+    };
+    // The foot's centre is 2 * 0.213 cos 0.9 below the hip, the capsule's radius 0.0233.
+    let foot = 0.3 - 0.426 * 0.9_f64.cos() - 0.0233;
+    assert!((lowest(Part::Calf) - foot).abs() < 1e-3, "{} {foot}", lowest(Part::Calf));
+    assert!((0.02..0.06).contains(&(lowest(Part::Mount) - foot)), "{}", lowest(Part::Mount));
+}
+
+proptest! {
+    #[test]
+    fn an_altitude_grows_along_its_gradient(
+        shares in shares(), tilt in prop::array::uniform3(-0.3..0.3f64), joint in 0..3usize, arm in any::<bool>(),
+    ) {
+        const STEP: f64 = 1e-6;
+        let model = model();
+        let joint = if arm { 12 + joint } else { joint };
+        let tilt = Isometry3::rotation(tilt.into());
+        let at = |by: f64| {
+            let mut joints = posture(&model, &shares);
+            joints[joint] += by;
+            altitudes(&model, &joints, &tilt).1
+        };
+        let joints = posture(&model, &shares);
+        let (ground, limb) = altitudes(&model, &joints, &tilt);
+        let bodies = body_poses(&model, &joints);
+        for ((end, before), after) in limb.iter().zip(at(-STEP)).zip(at(STEP)) {
+            let slope = (after.height - before.height) / (2.0 * STEP);
+            prop_assert!((slope - end.gradient(&ground, &bodies)[joint]).abs() < 1e-6, "{}", end.link);
+        }
     }
 }

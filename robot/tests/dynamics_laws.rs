@@ -97,6 +97,12 @@ proptest! {
             let rate = (after.frame(frame).jacobian - before.frame(frame).jacobian) / (2.0 * STEP);
             let bias = now.frame(frame).bias_acceleration;
             prop_assert!((rate * state.motion() - bias).amax() < 10.0 * TOLERANCE, "{frame:?}");
+            if let Some(joint) = frame.joint() {
+                let torso = &state.world_from_torso;
+                let point = torso.inv_mul(&now.frame(frame).world_from_frame).translation.vector;
+                let at_point = now.bias_acceleration_at(joint, &point);
+                prop_assert!((torso.rotation * at_point - bias.fixed_rows::<3>(0)).amax() < 1e-9);
+            }
         }
     }
 

@@ -147,10 +147,7 @@ struct Checked {
 
 fn unlimited(output: &WbcOutput) -> bool {
     let status = &output.status;
-    status.limited == 0
-        && status.grounded == 0
-        && status.kept_apart.is_none()
-        && status.acceleration_scale == 1.0
+    status.limited == 0 && !status.grounded && status.kept_apart.is_none() && status.acceleration_scale == 1.0
 }
 
 fn laws_hold_in(case: &Case, seed: u64) {
@@ -347,7 +344,7 @@ fn the_command_is_continuous_where_a_target_is() {
             }
         }
         if apart(&bench.model, &first, &last) > 1e-4 {
-            let free = |output: &WbcOutput| output.status.limited == 0 && output.status.grounded == 0;
+            let free = |output: &WbcOutput| output.status.limited == 0 && !output.status.grounded;
             assert!(!free(&first) || !free(&last), "{}: {:?}", case.name, objectives[index].kind());
             jumps_at_stops += 1;
         }

@@ -1,4 +1,5 @@
-//! Self-collision: links as capsules, the pairs of them that can meet, and how far those are apart.
+//! Collisions: links as capsules, the pairs of them that can meet, how far those are apart, and how far links are
+//! above the ground.
 //!
 //! ```text
 //! collision.toml ──► shapes on links ──► pairs that can meet ──► those that are near ──► distance, gradient
@@ -7,9 +8,11 @@
 //! The whole-body controller stops links before they touch, the commander keeps targets out of the robot.
 
 mod capsule;
+mod ground;
 mod links;
 mod model;
 
 pub use capsule::{Capsule, Separation, separation};
+pub use ground::{Altitude, Ground};
 pub use links::{Link, Part};
 pub use model::{Clearance, Clearances, CollisionModel, MOST_NEAR, Pair, Shape};

@@ -10,7 +10,7 @@ use super::{
     links::{Link, Part, can_meet},
 };
 use crate::{
-    joints::{JointVector, Side},
+    joints::{JointVector, Leg, Side},
     kinematics::Bodies,
     model::{ModelError, PARENT},
 };
@@ -72,6 +72,7 @@ pub struct Pair {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CollisionModel {
     shapes: Vec<Shape>,
+    shapes_of_leg: [Vec<Shape>; 4],
     pairs: Vec<Pair>,
     pairs_of_side: [Vec<Pair>; 2],
 }
@@ -118,12 +119,19 @@ impl CollisionModel {
                 |pair: &&Pair| shapes[pair.first].link.leg == leg || shapes[pair.second].link.leg == leg;
             pairs.iter().filter(moves).copied().collect()
         };
-        Self { pairs_of_side: Side::ALL.map(of_side), shapes, pairs }
+        let shapes_of_leg =
+            Leg::ALL.map(|leg| shapes.iter().filter(|shape| shape.link.leg == Some(leg)).copied().collect());
+        Self { pairs_of_side: Side::ALL.map(of_side), shapes_of_leg, shapes, pairs }
     }
 
     /// All shapes.
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
+    }
+
+    /// Those of a leg and its arm.
+    pub fn shapes_of(&self, leg: Leg) -> &[Shape] {
+        &self.shapes_of_leg[leg.index()]
     }
 
     /// All pairs that can meet.

@@ -26,6 +26,6 @@ pub use foot_reach::FootReach;
 pub use limits::{LimbRange, Limits, Range, RateLimits, ReachRange, TorsoRange};
 pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
-pub use reach::{HalfSpace, Reach};
+pub use reach::Reach;
 pub use reference::{PoseReference, rebased_point};
 pub use support::{deepest_margin, from_above, push_inside};

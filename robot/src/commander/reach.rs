@@ -11,13 +11,13 @@
 //! by damped Gauss-Newton steps from the last solution, each brought to the nearest step that the limits permit
 //! ([`crate::polyhedron`]). With the joints' speed bounded, the solution is a path that the limb can follow.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::limits::{Range, ReachRange};
 use crate::{
-    collision::{Clearances, Part},
+    collision::{Clearances, Ground},
     joints::{JointVector, Side},
-    kinematics::{Bodies, BodyPoses, GripperKinematics, body_poses},
+    kinematics::{GripperKinematics, body_poses},
     model::Model,
     polyhedron::Polyhedron,
 };
@@ -46,23 +46,6 @@ pub struct Reach {
     polyhedron: Polyhedron,
 }
 
-/// What is above the ground: the points p of the torso's frame with n · p > offset.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HalfSpace {
-    /// n, upwards, of length 1.
-    pub normal: Vector3<f64>,
-    /// m
-    pub offset_m: f64,
-}
-
-impl HalfSpace {
-    /// Of a level ground at this height in the world.
-    pub fn above(world_from_torso: &Isometry3<f64>, height_m: f64) -> Self {
-        let normal = world_from_torso.rotation.inverse_transform_vector(&Vector3::z());
-        Self { normal, offset_m: height_m - world_from_torso.translation.z }
-    }
-}
-
 /// How a distance, of two links or of one from the ground, depends on the six joints.
 #[derive(Debug, Clone, Copy)]
 struct Wall {
@@ -72,8 +55,6 @@ struct Wall {
     slope: Vector6<f64>,
 }
 
-/// Links that can touch the ground: beyond the knee.
-const GROUNDED: [Part; 5] = [Part::Calf, Part::Mount, Part::Forearm, Part::Wrist, Part::Gripper];
 /// The most walls that are looked at: with the six joints' ends as many as the polyhedron takes.
 const WALLS: usize = Polyhedron::MOST - 12;
 
@@ -94,12 +75,12 @@ impl Reach {
     }
 
     /// The nearest pose to `torso_from_target` that can be reached by now; the other limbs are at `others`, the
-    /// ground is below `ground`. Allocates nothing.
+    /// ground is there. Allocates nothing.
     pub fn nearest(
         &mut self,
         model: &Model,
         others: &JointVector,
-        ground: &HalfSpace,
+        ground: &Ground,
         torso_from_target: &Isometry3<f64>,
         dt_s: f64,
     ) -> Isometry3<f64> {
@@ -122,7 +103,7 @@ impl Reach {
         &mut self,
         model: &Model,
         joints: &[usize; 6],
-        ground: &HalfSpace,
+        ground: &Ground,
         walls: &mut [Wall; WALLS],
     ) -> usize {
         let bodies = body_poses(model, &self.joints);
@@ -134,46 +115,19 @@ impl Reach {
             let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
             Wall { room: near.distance - clearance_m, slope }
         });
-        let from_ground = self.heights(model, joints, &bodies, ground);
+        let ends = ground.altitudes(self.side.leg(), &model.collision, &bodies);
+        let from_ground = ends.filter_map(|end| {
+            let room = end.height - self.range.ground_m;
+            let gradient = end.gradient(ground, &bodies);
+            let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
+            (room < INFLUENCE_M).then_some(Wall { room, slope })
+        });
         let mut count = 0;
         for (place, wall) in walls.iter_mut().zip(from_ground.chain(from_links)) {
             *place = wall;
             count += 1;
         }
         count
-    }
-
-    /// Both ends of each capsule that is near the ground.
-    fn heights(
-        &self,
-        model: &Model,
-        joints: &[usize; 6],
-        bodies: &BodyPoses,
-        ground: &HalfSpace,
-    ) -> impl Iterator<Item = Wall> {
-        let leg = Some(self.side.leg());
-        let shapes = model.collision.shapes().iter();
-        let of_limb =
-            shapes.filter(move |shape| shape.link.leg == leg && GROUNDED.contains(&shape.link.part));
-        of_limb.flat_map(|shape| [shape.capsule.a, shape.capsule.b].map(|end| (shape, end))).filter_map(
-            |(shape, end)| {
-                let moved_by = shape.link.joint()?;
-                let (rotation, origin) = bodies.pose(moved_by);
-                let point = rotation * end + origin;
-                let height = ground.normal.dot(&point) - ground.offset_m - shape.capsule.radius;
-                let room = height - self.range.ground_m;
-                let slope = Vector6::from_fn(|column, _| {
-                    let joint = joints[column];
-                    let (_, origin) = bodies.pose(joint);
-                    if joint <= moved_by {
-                        ground.normal.dot(&bodies.axis(joint).cross(&(point - origin)))
-                    } else {
-                        0.0
-                    }
-                });
-                (room < INFLUENCE_M).then_some(Wall { room, slope })
-            },
-        )
     }
 
     fn step(&mut self, model: &Model, target: &Isometry3<f64>, walls: &mut [Wall], dt_s: f64) {

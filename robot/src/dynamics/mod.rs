@@ -265,6 +265,13 @@ impl Dynamics {
         &self.frames[frame.index()]
     }
 
+    /// Acceleration of a point of a joint's body when dv/dt = 0; the point and it along the torso's axes, m/s².
+    pub fn bias_acceleration_at(&self, joint: usize, point: &Vector3<f64>) -> Vector3<f64> {
+        let link = &self.links[joint];
+        // The spatial acceleration at the point lacks the turning of the point's velocity, ω × ṗ.
+        link.bias_acceleration.at(point) + link.velocity.angular.cross(&link.velocity.at(point))
+    }
+
     /// A(q), with the rotors' reflected inertia on its diagonal.
     pub fn mass_matrix(&self) -> &MassMatrix {
         &self.mass_matrix

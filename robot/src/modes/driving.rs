@@ -4,9 +4,10 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 use super::{mode::Effector, scene::Scene, setpoint::Setpoint};
 use crate::{
+    collision::Ground,
     commander::{
-        Command, DrivenBody, FootReach, Grip, HalfSpace, Limits, PoseReference, RateLimits, Reach,
-        SampleClock, from_above, push_inside,
+        Command, DrivenBody, FootReach, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
+        from_above, push_inside,
     },
     joints::{JointVector, Side},
     kinematics::torso_from_frame,
@@ -234,7 +235,7 @@ impl Driving {
     ) {
         let (range, start) = (self.limits.gripper, self.limb_start);
         let (reach, world_from_torso) = (&mut self.gripper_reach, setpoint.torso.pose());
-        let ground = HalfSpace::above(&world_from_torso, scene.ground(&setpoint.contacts));
+        let ground = Ground::at(scene.ground(&setpoint.contacts), &world_from_torso);
         let permitted = |wanted: &Isometry3<f64>| {
             let position = range.clamp(&wanted.translation.vector, &start, side);
             let inside = Isometry3::from_parts(position.into(), wanted.rotation);

@@ -194,7 +194,7 @@ impl WholeBodyController {
         }
         self.stops.restrict(&around, &mut self.tracked);
         status.limited = self.stops.joints();
-        status.grounded = self.stops.frames();
+        status.grounded = self.stops.grounded();
         status.kept_apart = self.stops.pair();
     }
 

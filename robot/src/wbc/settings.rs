@@ -89,6 +89,8 @@ pub struct StopSettings {
     pub step_time_s: f64,
     /// Links stay so far apart, m.
     pub collision_margin: f64,
+    /// Links of a limb in the air stay so far above what the other feet stand on, m.
+    pub ground_clearance: f64,
 }
 
 impl Default for StopSettings {
@@ -100,6 +102,7 @@ impl Default for StopSettings {
             speed_share: 0.7,
             step_time_s: 0.05,
             collision_margin: 0.01,
+            ground_clearance: 0.01,
         }
     }
 }
@@ -116,10 +119,6 @@ pub struct WbcSettings {
     pub stops: StopSettings,
     /// Joints stop this far before the ends of their ranges, rad.
     pub joint_margin: f64,
-    /// A lifted foot stays so far above the height of the standing feet, m.
-    pub foot_clearance: f64,
-    /// The gripper of a lifted foot stays so far above the height of the standing feet, m.
-    pub gripper_clearance: f64,
     /// Greatest joint acceleration asked for by the objectives together, rad/s².
     pub max_joint_acceleration: f64,
 }
@@ -183,8 +182,6 @@ impl Default for WbcSettings {
             },
             stops: StopSettings::default(),
             joint_margin: 0.01,
-            foot_clearance: 0.01,
-            gripper_clearance: 0.01,
             max_joint_acceleration: 200.0,
         }
     }
@@ -233,10 +230,13 @@ impl WbcSettings {
             ("stops.speed_share", stops.speed_share > 0.0 && stops.speed_share <= 1.0, "above 0, at most 1"),
             ("stops.step_time_s", positive(stops.step_time_s), "above 0 s"),
             ("stops.collision_margin", (0.0..0.05).contains(&stops.collision_margin), "0 to 0.05 m"),
+            (
+                "stops.ground_clearance",
+                (0.0..0.1).contains(&stops.ground_clearance),
+                "at least 0 and below 0.1 m",
+            ),
             ("max_joint_acceleration", positive(self.max_joint_acceleration), "above 0 rad/s2"),
             ("joint_margin", (0.0..0.2).contains(&self.joint_margin), "at least 0 and below 0.2 rad"),
-            ("foot_clearance", (0.0..0.1).contains(&self.foot_clearance), "at least 0 and below 0.1 m"),
-            ("gripper_clearance", (0.0..0.1).contains(&self.gripper_clearance), "at least 0 and below 0.1 m"),
             ("contact.friction", positive(contact.friction), "above 0"),
             ("contact.min_vertical", least >= 0.0 && least.is_finite(), "at least 0 body weights"),
             ("contact.max_vertical", contact.max_vertical > least, "above contact.min_vertical"),

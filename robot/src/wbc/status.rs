@@ -57,8 +57,8 @@ pub struct WbcStatus {
     /// Joints that are held to what their range and their speed permit, or whose desired position, velocity or torque was
     /// cut to its limit, a bit for each.
     pub limited: u32,
-    /// Frames that are kept above the ground, a bit for each in the order of `Frame::ALL`.
-    pub grounded: u32,
+    /// A link of a limb in the air is kept above the ground.
+    pub grounded: bool,
     /// Two links that are kept from touching each other; one such pair if there are more.
     pub kept_apart: Option<[Link; 2]>,
     /// Set when the output should not be trusted to balance the robot.
@@ -73,7 +73,7 @@ impl Default for WbcStatus {
             torques_relaxed: false,
             acceleration_scale: 1.0,
             limited: 0,
-            grounded: 0,
+            grounded: false,
             kept_apart: None,
             fault: None,
         }

@@ -18,13 +18,13 @@ use super::{
     ContactSet, Objective, ObjectiveKind, Tracked, WbcSettings,
     barrier::{Interval, Window},
     objective::Robot,
-    task::{Task, height_row},
+    task::Task,
 };
 use crate::{
-    collision::{Clearance, Clearances, Link, MOST_NEAR},
+    collision::{Altitude, Clearance, Clearances, Ground, Link, MOST_NEAR, Part},
     dynamics::{DOF, Dynamics, Motion, State},
     joints::{JOINTS, Leg, Side},
-    model::{Frame, Model},
+    model::{FOOT_RADIUS_M, Frame, Model},
     polyhedron::Polyhedron,
 };
 
@@ -34,13 +34,13 @@ pub(super) const MOST_HELD: usize = 6;
 /// Directions of a held joint that what stands before it has nearly used up fade out below this.
 const DAMPING_START: f64 = 0.1;
 
-/// Quantities other than joints: feet, grippers, pairs of links.
-const MOST_ROWS: usize = 2 + MOST_NEAR;
+/// Quantities other than joints: heights of capsules' ends, distances of pairs of links.
+const MOST_ROWS: usize = 24 + MOST_NEAR;
 
 /// Shorter gradients of a distance are taken as this long, m/rad: there joints cannot change it.
 const SHORTEST_GRADIENT: f64 = 0.01;
 
-/// A pair of links is looked at when it is nearer than this to its margin, m: at the greatest speed of a
+/// What is nearer than this to its limit is looked at, m: at the greatest speed of a
 /// target (0.5 m/s) the barrier begins to act at 0.033 m.
 const INFLUENCE_M: f64 = 0.06;
 
@@ -58,7 +58,9 @@ const METRES_PER_JOINT: f64 = 0.02;
 /// What a row belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum What {
-    Frame(Frame),
+    /// A link above the ground.
+    Ground,
+    /// Two links.
     Pair([Link; 2]),
 }
 
@@ -105,7 +107,7 @@ impl Stops {
     /// Takes all memory that it will need.
     pub(super) fn new() -> Self {
         let row = Row {
-            what: What::Frame(Frame::Torso),
+            what: What::Ground,
             leg: Leg::FrontRight,
             direction: [0.0; DOF],
             bias: 0.0,
@@ -145,38 +147,43 @@ impl Stops {
         }
     }
 
-    /// A lifted limb's foot, unless it is being put down, and its gripper stay above the ground that the other
-    /// feet stand on: a foot that touches it unplanned lifts the torso off its course.
+    /// Links of a limb in the air stay above the ground, but for a calf whose foot is being put down: what touches
+    /// it unplanned lifts the torso off its course.
     fn limit_heights(&mut self, around: &Surroundings) {
-        let Some(ground) = ground_height(around) else { return };
-        for leg in Leg::ALL.into_iter().filter(|leg| !around.contacts.contains(*leg)) {
+        let Surroundings { model, state, dynamics, contacts, .. } = around;
+        let Some(height) = ground_height(around) else { return };
+        let ground = Ground::at(height, &state.world_from_torso);
+        for leg in Leg::ALL.into_iter().filter(|leg| !contacts.contains(*leg)) {
             let lands = |objective: &Objective| objective.kind() == ObjectiveKind::FootPosition(leg);
-            if !around.objectives.iter().any(lands) {
-                self.limit_height(around, Frame::Foot(leg), leg, ground + around.settings.foot_clearance);
-            }
-            if let Some(side) = leg.side() {
-                self.limit_height(
-                    around,
-                    Frame::Gripper(side),
-                    leg,
-                    ground + around.settings.gripper_clearance,
-                );
+            let lands = around.objectives.iter().any(lands);
+            for end in ground.altitudes(leg, &model.collision, *dynamics) {
+                if !(lands && end.link.part == Part::Calf) {
+                    self.limit_height(around, &ground, leg, &end);
+                }
             }
         }
     }
 
-    fn limit_height(&mut self, around: &Surroundings, frame: Frame, leg: Leg, least: f64) {
-        let motion = around.dynamics.frame(frame);
-        let row = height_row(motion);
-        let room = motion.world_from_frame.translation.z - least;
-        let scale =
-            1.0 / row[6..].iter().map(|entry| entry * entry).sum::<f64>().sqrt().max(SHORTEST_GRADIENT);
+    fn limit_height(&mut self, around: &Surroundings, ground: &Ground, leg: Leg, end: &Altitude) {
+        let Surroundings { state, dynamics, settings, .. } = around;
+        let room = end.height - settings.stops.ground_clearance;
+        if room > INFLUENCE_M {
+            return;
+        }
+        let gradient = end.gradient(ground, *dynamics);
+        let scale = 1.0 / gradient.norm().max(SHORTEST_GRADIENT);
+        let mut direction = [0.0; DOF];
+        direction[..3].copy_from_slice((ground.up * scale).as_slice());
+        direction[3..6].copy_from_slice((end.center.cross(&ground.up) * scale).as_slice());
+        direction[6..].copy_from_slice((gradient * scale).as_slice());
+        let speed: f64 = direction.iter().zip(state.motion().iter()).map(|(a, b)| a * b).sum();
+        let bias = ground.up.dot(&dynamics.bias_acceleration_at(end.joint, &end.center));
         self.push(Row {
-            what: What::Frame(frame),
+            what: What::Ground,
             leg,
-            direction: row.map(|entry| entry * scale),
-            bias: motion.bias_acceleration.z * scale,
-            window: Window::above(room * scale, motion.velocity.z * scale, 1.0, &around.settings.stops),
+            direction,
+            bias: bias * scale,
+            window: Window::above(room * scale, speed, 1.0, &settings.stops),
             acts: false,
         });
     }
@@ -321,19 +328,15 @@ impl Stops {
         held.fold(self.stopped, |joints, (joint, _)| joints | 1 << joint)
     }
 
-    /// The frames that are kept above the ground, a bit for each in the order of [`Frame::ALL`].
-    pub(super) fn frames(&self) -> u32 {
-        let frames = self.acting().filter_map(|row| match row.what {
-            What::Frame(frame) => Some(frame.index()),
-            What::Pair(_) => None,
-        });
-        frames.fold(0, |frames, frame| frames | 1 << frame)
+    /// Whether a link is kept above the ground.
+    pub(super) fn grounded(&self) -> bool {
+        self.acting().any(|row| row.what == What::Ground)
     }
 
     /// One of the pairs of links that are kept apart.
     pub(super) fn pair(&self) -> Option<[Link; 2]> {
         self.acting().find_map(|row| match row.what {
-            What::Frame(_) => None,
+            What::Ground => None,
             What::Pair(links) => Some(links),
         })
     }
@@ -414,10 +417,10 @@ fn metric_of(around: &Surroundings, joints: &[Option<usize>; 6]) -> Matrix6<f64>
     metric
 }
 
-/// Mean height of the standing feet's centres; nothing without any.
+/// Height of the ground under the feet that stand, in their mean; nothing without any.
 fn ground_height(around: &Surroundings) -> Option<f64> {
     let height = |leg| around.dynamics.frame(Frame::Foot(leg)).world_from_frame.translation.z;
     let (sum, count) =
         around.contacts.legs().fold((0.0, 0.0), |(sum, count), leg| (sum + height(leg), count + 1.0));
-    (count > 0.0).then(|| sum / count)
+    (count > 0.0).then(|| sum / count - FOOT_RADIUS_M)
 }

@@ -69,11 +69,6 @@ pub(super) fn rows(frame: &FrameMotion, first: usize) -> Rows {
     std::array::from_fn(|row| std::array::from_fn(|column| frame.jacobian[(first + row, column)]))
 }
 
-/// The row of a frame's Jacobian that gives its vertical velocity.
-pub(super) fn height_row(frame: &FrameMotion) -> [f64; DOF] {
-    std::array::from_fn(|column| frame.jacobian[(2, column)])
-}
-
 pub(super) fn linear(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
     twist.fixed_rows::<3>(0).into_owned()
 }

@@ -66,6 +66,15 @@ pub struct Truth {
     pub fallen: bool,
 }
 
+/// A contact that no plan has, of geoms by their names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unplanned {
+    /// Two links touch.
+    OfItself([String; 2]),
+    /// Something other than a foot touches the ground.
+    WithGround(String),
+}
+
 impl World {
     /// Compiles the scene and puts rubber under the feet.
     pub fn new(mjcf: &str, feet: &FootCompliance) -> Result<Self, SimRobotError> {
@@ -223,17 +232,22 @@ impl World {
     }
 
     /// Contacts that no plan has: of arms with the trunk or each other, and of anything but feet with the ground.
-    pub fn unplanned_contacts(&self) -> [usize; 2] {
-        let mut count = [0; 2];
-        for contact in self.data.contact().iter().filter(|contact| contact.dist < 0.0) {
-            let is_foot = |geom: i32| self.foot_of_geom.get(address(geom)).copied().flatten().is_some();
-            if !contact.geom.contains(&self.ground) {
-                count[0] += 1;
-            } else if !contact.geom.into_iter().any(is_foot) {
-                count[1] += 1;
+    pub fn unplanned_contacts(&self) -> impl Iterator<Item = Unplanned> + '_ {
+        let is_foot = |geom: i32| self.foot_of_geom.get(address(geom)).copied().flatten().is_some();
+        self.data.contact().iter().filter(|contact| contact.dist < 0.0).filter_map(move |contact| {
+            let [a, b] = contact.geom;
+            match (a == self.ground, b == self.ground) {
+                (false, false) => Some(Unplanned::OfItself([a, b].map(|geom| self.geom_name(geom)))),
+                (true, _) if !is_foot(b) => Some(Unplanned::WithGround(self.geom_name(b))),
+                (_, true) if !is_foot(a) => Some(Unplanned::WithGround(self.geom_name(a))),
+                _ => None,
             }
-        }
-        count
+        })
+    }
+
+    fn geom_name(&self, geom: i32) -> String {
+        let name = self.calm.id_to_name(MjtObjBase::mjOBJ_GEOM, address(geom));
+        name.unwrap_or_default().to_owned()
     }
 
     /// Whether the trunk touches the ground or is tilted beyond 60 degrees.

@@ -30,8 +30,8 @@ fn gripper(model: &Model, joints: &JointVector) -> Isometry3<f64> {
 }
 
 /// A level torso 0.325 m above it.
-fn ground() -> HalfSpace {
-    HalfSpace::above(&Isometry3::identity(), -0.325)
+fn ground() -> Ground {
+    Ground::at(-0.325, &Isometry3::identity())
 }
 
 /// √ of what is minimized, m.
@@ -94,7 +94,7 @@ fn optimum(model: &Model, target: &Isometry3<f64>, random: &mut impl FnMut() -> 
 }
 
 /// What is left of the least of all distances, those from the ground included, m; no more than is looked at.
-fn least_room(model: &Model, sut: &mut Reach, ground: &HalfSpace) -> f64 {
+fn least_room(model: &Model, sut: &mut Reach, ground: &Ground) -> f64 {
     let mut walls = [Wall { room: 0.0, slope: Vector6::zeros() }; WALLS];
     let count = sut.walls(model, &LIMB, ground, &mut walls);
     walls[..count].iter().map(|wall| wall.room).fold(INFLUENCE_M, f64::min)
@@ -160,7 +160,7 @@ fn nothing_touches_the_ground_however_low_target_and_torso_go() {
                 let torso =
                     Isometry3::new(Vector3::new(0.0, 0.0, -0.3 * share), Vector3::new(share, share, 0.0));
                 let target = torso.inv_mul(&low);
-                let ground = HalfSpace::above(&torso, -0.325);
+                let ground = Ground::at(-0.325, &torso);
                 let now = walk.sut.nearest(&walk.model, &walk.others, &ground, &target, DT_S);
                 assert!(least_room(&walk.model, &mut walk.sut, &ground) > -1e-3);
                 let step = now.translation.vector - walk.last.translation.vector;

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::eval::body::Body;
 use crate::eval::lockstep::{Lockstep, ticks};
+use crate::robot::world::Unplanned;
 use crate::robot::{EXCHANGE_S, Truth};
 
 /// Ticks between the positions whose third difference is the jerk: 20 ms. What is faster than 25 Hz is noise of
@@ -110,6 +111,8 @@ pub struct Monitor {
     pub tracks: [Track; 2],
     /// When and why it ended early.
     pub end: Option<String>,
+    /// What touched what, though it should not.
+    pub touched: Vec<Unplanned>,
 }
 
 impl Monitor {
@@ -123,6 +126,7 @@ impl Monitor {
             findings: Findings::default(),
             tracks: Default::default(),
             end: None,
+            touched: Vec::new(),
         }
     }
 
@@ -165,9 +169,18 @@ impl Monitor {
             let torque = if joint < 12 { applied[joint] } else { commanded[joint] };
             found.torque_share.raise(torque.abs() / model.max_torque[joint], joint);
         }
-        let [own, ground] = world.unplanned_contacts();
-        found.self_contacts += u64::from(own > 0);
-        found.ground_contacts += u64::from(ground > 0);
+        let (mut own, mut ground) = (false, false);
+        for contact in world.unplanned_contacts() {
+            match contact {
+                Unplanned::OfItself(_) => own = true,
+                Unplanned::WithGround(_) => ground = true,
+            }
+            if !self.touched.contains(&contact) {
+                self.touched.push(contact);
+            }
+        }
+        found.self_contacts += u64::from(own);
+        found.ground_contacts += u64::from(ground);
         !found.is_over()
     }
 }
