@@ -62,12 +62,7 @@ impl PoseFollower {
     /// The target at which the follower comes to rest without turning back: ahead by ẋ/ω, or by the braking
     /// distance if that is longer.
     pub fn stopping_pose(&self) -> Isometry3<f64> {
-        self.stopping_pose_of(&self.reference)
-    }
-
-    /// The same for another motion.
-    pub fn stopping_pose_of(&self, motion: &PoseReference) -> Isometry3<f64> {
-        let PoseReference { point, rotation } = motion;
+        let PoseReference { point, rotation } = &self.reference;
         let ahead = |velocity: &Vector3<f64>, limit: f64| {
             let time_s = (1.0 / self.omega).max(velocity.norm() / (2.0 * BRAKING_SHARE * limit));
             velocity * time_s
