@@ -33,6 +33,9 @@ const SPEED_RAD_S: f64 = 4.0;
 const MARGIN_RAD: f64 = 0.03;
 /// Links nearer than this beyond their clearance are looked at, m.
 const INFLUENCE_M: f64 = 0.03;
+/// The solution stays so near to what the limb is asked for, rad: it does not go over to a posture in which the limb
+/// is not.
+const LEAD_RAD: f64 = 0.6;
 /// Steps in each control period: a reachable target is met to a hundredth of a millimetre.
 const STEPS: usize = 3;
 
@@ -93,7 +96,7 @@ impl Reach {
         let mut walls = [Wall { room: 0.0, slope: Vector6::zeros() }; WALLS];
         let count = self.walls(model, &now.joints, ground, &mut walls);
         for _ in 0..STEPS {
-            self.step(model, torso_from_target, &mut walls[..count], dt_s / STEPS as f64);
+            self.step(model, others, torso_from_target, &mut walls[..count], dt_s / STEPS as f64);
         }
         GripperKinematics::new(model, &self.joints, self.side).torso_from_gripper
     }
@@ -130,7 +133,14 @@ impl Reach {
         count
     }
 
-    fn step(&mut self, model: &Model, target: &Isometry3<f64>, walls: &mut [Wall], dt_s: f64) {
+    fn step(
+        &mut self,
+        model: &Model,
+        limb: &JointVector,
+        target: &Isometry3<f64>,
+        walls: &mut [Wall],
+        dt_s: f64,
+    ) {
         let now = GripperKinematics::new(model, &self.joints, self.side);
         let mut error = Vector6::zeros();
         let moved = target.translation.vector - now.torso_from_gripper.translation.vector;
@@ -146,6 +156,10 @@ impl Reach {
         self.polyhedron.clear();
         for (column, joint) in now.joints.into_iter().enumerate() {
             let range = self.range(model, column, joint);
+            let range = Range {
+                min: range.min.max(limb[joint] - LEAD_RAD).min(range.max),
+                max: range.max.min(limb[joint] + LEAD_RAD).max(range.min),
+            };
             let most = dt_s * SPEED_RAD_S.min(SPEED_SHARE * model.max_velocity[joint]);
             let angle = self.joints[joint];
             let unit = Vector6::ith(column, 1.0);
