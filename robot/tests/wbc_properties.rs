@@ -156,7 +156,8 @@ fn laws_hold_in(case: &Case, seed: u64) {
     let mut dynamics = Dynamics::new();
     let mut checked = Checked::default();
     for _ in 0..STATES {
-        let state = situations::state(&mut random, &bench.model);
+        let mut state = situations::state(&mut random, &bench.model);
+        situations::draw_up(&mut state, &case.stance, &bench.model);
         dynamics.update(&bench.model, &state);
         let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);

@@ -89,6 +89,16 @@ pub fn state(random: &mut Random, model: &Model) -> State {
     }
 }
 
+/// Draws up the legs that do not stand: one in the air that is as low as the others touches the ground.
+#[allow(dead_code, reason = "not every test that takes situations from here needs legs off the ground")]
+pub fn draw_up(state: &mut State, stance: &[Leg], model: &Model) {
+    const BY_RAD: f64 = 0.3;
+    for leg in Leg::ALL.into_iter().filter(|leg| !stance.contains(leg)) {
+        let calf = leg.first_joint() + 2;
+        state.position[calf] = (state.position[calf] - BY_RAD).max(model.lower[calf]);
+    }
+}
+
 fn stand() -> JointVector {
     let mut position = JointVector::zeros();
     for leg in Leg::ALL {
