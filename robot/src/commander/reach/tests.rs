@@ -40,9 +40,9 @@ fn miss(target: &Isometry3<f64>, reached: &Isometry3<f64>) -> f64 {
     moved.hypot(METRES_PER_RADIAN * target.rotation.angle_to(&reached.rotation))
 }
 
+/// A limb that goes at once where it is asked to.
 struct Walk {
     model: Model,
-    others: JointVector,
     sut: Reach,
     last: Isometry3<f64>,
     fastest: f64,
@@ -51,18 +51,18 @@ struct Walk {
 
 impl Walk {
     fn new() -> Self {
-        let (model, others) = (model(), ready());
-        let last = gripper(&model, &others);
-        let sut = Reach::new(Side::Right, &others, Limits::default().reach);
-        Self { model, others, sut, last, fastest: 0.0, turn: 0.0 }
+        let model = model();
+        let last = gripper(&model, &ready());
+        let sut = Reach::new(Side::Right, &ready(), Limits::default().reach);
+        Self { model, sut, last, fastest: 0.0, turn: 0.0 }
     }
 
     fn to(&mut self, from: &Isometry3<f64>, goal: &Isometry3<f64>, seconds: f64) -> Isometry3<f64> {
         let ticks = (seconds / DT_S) as u32;
         for tick in 1..=ticks {
             let share = f64::from(tick) / f64::from(ticks);
-            let now =
-                self.sut.nearest(&self.model, &self.others, &ground(), &from.lerp_slerp(goal, share), DT_S);
+            let target = from.lerp_slerp(goal, share);
+            let now = self.sut.nearest(&self.model, &self.sut.joints.clone(), &ground(), &target, DT_S);
             let step = now.translation.vector - self.last.translation.vector;
             self.fastest = self.fastest.max(step.norm() / DT_S);
             self.turn = self.turn.max(now.rotation.angle_to(&self.last.rotation) / DT_S);
@@ -74,17 +74,16 @@ impl Walk {
 
 /// The best of many starts.
 fn optimum(model: &Model, target: &Isometry3<f64>, random: &mut impl FnMut() -> f64) -> f64 {
-    let others = ready();
     let mut best = f64::INFINITY;
     for _ in 0..30 {
-        let mut sut = Reach::new(Side::Right, &others, Limits::default().reach);
+        let mut sut = Reach::new(Side::Right, &ready(), Limits::default().reach);
         for (column, joint) in LIMB.into_iter().enumerate() {
             let range = sut.range(model, column, joint);
             sut.joints[joint] = range.min + random() * (range.max - range.min);
         }
         let mut reached = *target;
         for _ in 0..200 {
-            reached = sut.nearest(model, &others, &ground(), target, 0.02);
+            reached = sut.nearest(model, &sut.joints.clone(), &ground(), target, 0.02);
         }
         if is_free(model, &mut sut) {
             best = best.min(miss(target, &reached));
@@ -161,7 +160,7 @@ fn nothing_touches_the_ground_however_low_target_and_torso_go() {
                     Isometry3::new(Vector3::new(0.0, 0.0, -0.3 * share), Vector3::new(share, share, 0.0));
                 let target = torso.inv_mul(&low);
                 let ground = Ground::at(-0.325, &torso);
-                let now = walk.sut.nearest(&walk.model, &walk.others, &ground, &target, DT_S);
+                let now = walk.sut.nearest(&walk.model, &walk.sut.joints.clone(), &ground, &target, DT_S);
                 assert!(least_room(&walk.model, &mut walk.sut, &ground) > -1e-3);
                 let step = now.translation.vector - walk.last.translation.vector;
                 assert!(step.norm() < 2.0 * DT_S || tick == 0, "{}", step.norm() / DT_S);
