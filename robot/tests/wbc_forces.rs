@@ -92,9 +92,6 @@ struct Met {
     load_limited: u32,
     torque_limited: u32,
     infeasible: u32,
-    undecided: u32,
-    not_proved: u32,
-    not_converged: u32,
     worst_n: f64,
 }
 
@@ -149,15 +146,8 @@ fn both_solvers_agree_on_100_000_recorded_problems() {
                 assert!(apart < AGREEMENT, "{index}, {}: {fast:?} against {slow:?}", case.name);
                 met.sort(problem, &fast);
             }
-            (Err(ForceFailure::Infeasible), Err(slow)) => {
-                met.infeasible += 1;
-                // Clarabel's certificate does not always come within the cap on iterations.
-                met.undecided += u32::from(slow != ForceFailure::Infeasible);
-            }
-            // The interior-point method decides what the active set does not prove.
-            (Err(ForceFailure::Iterations | ForceFailure::Numerical), Ok(())) => met.not_proved += 1,
-            // What the active set proves needs no second opinion.
-            (Ok(()), Err(ForceFailure::Iterations | ForceFailure::Numerical)) => met.not_converged += 1,
+            (Err(ForceFailure::Infeasible), Err(ForceFailure::Infeasible)) => met.infeasible += 1,
+            // Neither leaves a problem undecided.
             _ => panic!("{index}, {}: {proved:?} against {solved:?}: {problem:?}", case.name),
         }
         assert_eq!(output.status.torques_relaxed, proved == Err(ForceFailure::Infeasible));
@@ -165,8 +155,6 @@ fn both_solvers_agree_on_100_000_recorded_problems() {
     println!("{met:?}");
     let kinds = [met.friction_limited, met.load_limited, met.torque_limited, met.infeasible];
     assert!(kinds.into_iter().all(|count| count > PROBLEMS / 500), "{met:?}");
-    assert!(met.not_converged < PROBLEMS / 10_000, "{met:?}");
-    assert!(met.not_proved < PROBLEMS / 1000 && met.undecided < met.infeasible / 10, "{met:?}");
 }
 
 #[test]
