@@ -1,7 +1,8 @@
 //! Time of the control step and its parts, beside the peers'.
 //!
 //! `cargo xtask bench`, or `cargo bench -p locoman-robot --bench wbc`. All times are processor time of one
-//! thread, so that what else runs on the machine counts little. The peers were timed on the same kind of
+//! thread, so that what else runs on the machine counts little; what its interrupts still add to the last
+//! percentiles shows in the first row, whose work is always the same. The peers were timed on the same kind of
 //! machine with the same robot; where a program of theirs needs several calls for a step, they are added.
 
 #![expect(clippy::expect_used, reason = "in a benchmark a panic is the report")]
@@ -25,10 +26,13 @@ use scenes::{Scene, model, scenes, state};
 const STEPS: u32 = 40_000;
 /// Steps before them, for the processor to settle.
 const WARM_UP: u32 = 2_000;
+/// Multiplications, one after the other, that take about as long as a step.
+const MULTIPLICATIONS: u32 = 30_000;
 
 fn main() {
     let clock = clock_ns();
     println!("µs of processor time                             p50     p99   p99.9   peers' medians");
+    time_machine(clock);
     time_dynamics(clock);
     let scenes = scenes();
     for scene in &scenes {
@@ -63,6 +67,14 @@ impl Method {
             Self::InteriorPointOnly => "Clarabel alone",
         }
     }
+}
+
+/// What the machine adds to the same work without memory.
+fn time_machine(clock: u64) {
+    let times = timed(clock, |_| {
+        black_box((0..MULTIPLICATIONS).fold(black_box(1.0_f64), |product, _| product * 1.000_001 + 1e-6));
+    });
+    print_row("the machine: the same multiplications", &times, "");
 }
 
 fn time_dynamics(clock: u64) {
