@@ -14,8 +14,8 @@ const FEASIBILITY: f64 = 1e-8;
 const STATIONARITY: f64 = 1e-9;
 /// Squared length below which a constraint's normal depends on those of the active ones.
 const DEPENDENT: f64 = 1e-18;
-/// Steps before giving up; each adds or drops a constraint.
-const MAX_STEPS: usize = 100;
+/// Steps before giving up; each adds or drops a constraint. The most that one of three million problems took is 109.
+const MAX_STEPS: usize = 200;
 
 /// The method's workspace.
 #[derive(Debug, Clone)]
