@@ -100,7 +100,7 @@ impl Default for StopSettings {
             braking: 40.0,
             max_acceleration: 100.0,
             speed_share: 0.7,
-            step_time_s: 0.05,
+            step_time_s: 0.02,
             collision_margin: 0.01,
             ground_clearance: 0.01,
         }
