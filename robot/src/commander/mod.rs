@@ -17,6 +17,7 @@ mod ramp;
 mod reach;
 mod reference;
 mod support;
+mod torso_reach;
 
 pub use body::DrivenBody;
 pub use command::{Command, EngagementId, RequestId};
@@ -29,3 +30,4 @@ pub use ramp::{Ramp, SampleClock};
 pub use reach::Reach;
 pub use reference::{PoseReference, rebased_point};
 pub use support::{deepest_margin, from_above, push_inside};
+pub use torso_reach::{Footing, TorsoReach};

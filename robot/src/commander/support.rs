@@ -5,31 +5,29 @@ use nalgebra::{Vector2, Vector3};
 /// In a corner of 34 degrees, the sharpest of three feet, a round leaves 0.7 of what lacks: 1 % in the end.
 const ROUNDS: usize = 16;
 
+/// The edges of the polygon of the feet, seen from above: a corner, and the direction inwards, of length 1. With fewer
+/// than three feet there is no polygon.
+pub fn edges(feet: &[Vector2<f64>]) -> impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> + '_ {
+    let centre = feet.iter().sum::<Vector2<f64>>() / feet.len().max(1) as f64;
+    let pairs = feet.iter().enumerate().flat_map(|(i, a)| feet[i + 1..].iter().map(move |b| (a, b)));
+    pairs.filter(|_| feet.len() >= 3).filter_map(move |(a, b)| {
+        let along = b - a;
+        let normal = Vector2::new(-along.y, along.x).normalize();
+        let inwards = if normal.dot(&(centre - a)) < 0.0 { -normal } else { normal };
+        // A diagonal of the polygon has feet on both sides: it is no edge.
+        feet.iter().all(|foot| inwards.dot(&(foot - a)) >= -1e-9).then_some((*a, inwards))
+    })
+}
+
 /// The smallest push that brings a point at least `margin_m` inside the polygon of the feet, seen from above.
 ///
 /// Each edge that is too near pushes the point away from itself, round by round until a corner is settled. With fewer
 /// than three feet there is no polygon, and no push.
 pub fn push_inside(point: &Vector2<f64>, feet: &[Vector2<f64>], margin_m: f64) -> Vector2<f64> {
     let mut inside = *point;
-    if feet.len() < 3 {
-        return Vector2::zeros();
-    }
-    let centre = feet.iter().sum::<Vector2<f64>>() / feet.len() as f64;
     for _ in 0..ROUNDS {
-        for (i, a) in feet.iter().enumerate() {
-            for b in &feet[i + 1..] {
-                let along = b - a;
-                let normal = Vector2::new(-along.y, along.x).normalize();
-                let normal = if normal.dot(&(centre - a)) < 0.0 { -normal } else { normal };
-                // A diagonal of the polygon has feet on both sides: it is no edge.
-                if feet.iter().any(|foot| normal.dot(&(foot - a)) < -1e-9) {
-                    continue;
-                }
-                let lacking = margin_m - normal.dot(&(inside - a));
-                if lacking > 0.0 {
-                    inside += lacking * normal;
-                }
-            }
+        for (corner, inwards) in edges(feet) {
+            inside += (margin_m - inwards.dot(&(inside - corner))).max(0.0) * inwards;
         }
     }
     inside - point

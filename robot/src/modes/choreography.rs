@@ -167,7 +167,7 @@ impl Choreography {
                 self.move_torso(&scene.middle_of_feet(self.poses.stand_height_m));
                 self.stow_arms(scene);
             }
-            Phase::Stance => self.driving.begin_stance(&self.setpoint),
+            Phase::Stance => self.driving.begin_stance(&self.setpoint, scene),
             Phase::ShiftTorso(effector) => {
                 self.shift = Shift::plan(&self.poses, scene, effector);
                 let goal = self.shift.torso;

@@ -6,10 +6,10 @@ use super::{mode::Effector, scene::Scene, setpoint::Setpoint};
 use crate::{
     collision::Ground,
     commander::{
-        Command, DrivenBody, FootReach, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
-        from_above, push_inside,
+        Command, DrivenBody, FootReach, Footing, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
+        TorsoReach, from_above,
     },
-    joints::{JointVector, Side},
+    joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
     model::{FOOT_RADIUS_M, Frame},
     trajectory::{Player, Sample},
@@ -36,6 +36,7 @@ pub struct Operator<'a> {
 pub struct Driving {
     limits: Limits,
     torso: DrivenBody,
+    torso_reach: TorsoReach,
     /// From the torso's origin to the robot's centre of mass, seen from above, along the world's axes, m.
     com_from_torso: Option<Vector2<f64>>,
     /// The end effector in manipulation; on four feet there is none.
@@ -57,6 +58,7 @@ impl Driving {
         let still = PoseReference::hold(&Isometry3::identity());
         Self {
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
+            torso_reach: TorsoReach::new(&Isometry3::identity(), posture),
             com_from_torso: None,
             effector: None,
             limb: DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate),
@@ -76,15 +78,15 @@ impl Driving {
     }
 
     /// Takes over the torso on four feet.
-    pub fn begin_stance(&mut self, setpoint: &Setpoint) {
+    pub fn begin_stance(&mut self, setpoint: &Setpoint, scene: &Scene<'_>) {
         self.effector = None;
-        self.begin_torso(setpoint, self.limits.stance_torso_rate);
+        self.begin_torso(setpoint, self.limits.stance_torso_rate, scene);
     }
 
     /// Takes over torso and foot, as its reference moves.
     pub fn begin_foot(&mut self, side: Side, setpoint: &mut Setpoint, scene: &Scene<'_>) {
         self.effector = Some(Effector::Foot(side));
-        self.begin_torso(setpoint, self.limits.gripper_torso_rate);
+        self.begin_torso(setpoint, self.limits.gripper_torso_rate, scene);
         let torso_from_foot = torso_from_frame(scene.model, scene.desired, Frame::Foot(side.leg()));
         let mut foot = PoseReference::hold(&(setpoint.torso.pose() * torso_from_foot));
         foot.point = setpoint.foot(side.leg()).copied().unwrap_or(foot.point);
@@ -96,7 +98,7 @@ impl Driving {
     /// Takes over torso and gripper; the gripper begins where the desired joints hold it.
     pub fn begin_gripper(&mut self, side: Side, setpoint: &mut Setpoint, scene: &Scene<'_>) {
         self.effector = Some(Effector::Gripper(side));
-        self.begin_torso(setpoint, self.limits.gripper_torso_rate);
+        self.begin_torso(setpoint, self.limits.gripper_torso_rate, scene);
         let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
         let gripper = PoseReference::hold(&(setpoint.torso.pose() * torso_from_gripper));
         self.begin_limb(gripper);
@@ -109,7 +111,8 @@ impl Driving {
         self.limb_start = reference.point.position;
     }
 
-    fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits) {
+    fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits, scene: &Scene<'_>) {
+        self.torso_reach = TorsoReach::new(&setpoint.torso.pose(), scene.desired);
         self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
         self.com_from_torso = None;
     }
@@ -176,25 +179,31 @@ impl Driving {
         self.player = None;
     }
 
-    /// The torso, within its range, with the centre of mass over the feet: where it really is, as leg and arm
-    /// reach out, so that the torso makes way for them.
+    /// The torso, within its range, where the legs can hold it with the centre of mass over the feet: where it really
+    /// is, as leg and arm reach out, so that the torso makes way for them.
     fn move_torso(&mut self, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         let range =
             if self.effector.is_some() { self.limits.gripper_torso } else { self.limits.stance_torso };
-        let margin_m = self.limits.support_margin_m;
-        let (feet, count) = scene.standing_feet(&setpoint.contacts);
         let measured = from_above(&(scene.com - scene.state.world_from_torso.translation.vector));
         let com_from_torso = self
             .com_from_torso
             .map_or(measured, |com| com + (measured - com) * (scene.dt_s * COM_CUTOFF_RAD_S).min(1.0));
         self.com_from_torso = Some(com_from_torso);
-        let permitted = |wanted: &Isometry3<f64>| {
-            let mut pose = range.clamp(wanted);
-            let com = from_above(&pose.translation.vector) + com_from_torso;
-            let push = push_inside(&com, &feet[..count], margin_m);
-            pose.translation.vector += Vector3::new(push.x, push.y, 0.0);
-            pose
+        let mut feet = [(Leg::FrontRight, Vector3::zeros()); 4];
+        let mut count = 0;
+        for (place, leg) in feet.iter_mut().zip(setpoint.contacts.legs()) {
+            *place = (leg, scene.foot(leg));
+            count += 1;
+        }
+        let footing = Footing {
+            feet: &feet[..count],
+            com_from_torso,
+            margin_m: self.limits.support_margin_m,
+            ground_m: scene.ground(&setpoint.contacts),
+            clearance_m: self.limits.reach.ground_m,
         };
+        let reach = &mut self.torso_reach;
+        let permitted = |wanted: &Isometry3<f64>| reach.nearest(scene.model, &footing, &range.clamp(wanted));
         match played {
             Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
             None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),

@@ -1,0 +1,185 @@
+//! Keeps the torso's target where the standing legs can hold it: their joints inside their ranges, the centre of
+//! mass over their feet, the mounts of the arms off the ground.
+//!
+//! The feet rest, so that a motion (δp, δθ) of the torso along the world's axes turns the joints of leg l by
+//!
+//! ```text
+//! δq_l = J_l⁻¹ Rᵀ ((f_l - p) × δθ - δp)          f_l: the foot, p and R: the torso, J_l: of the foot in its frame
+//! ```
+//! and every limit is a half-space of (δp, δθ). From the last solution, the step towards the target is brought to
+//! the nearest one inside all of them ([`crate::polyhedron`]): a robot that is asked to lean too far leans as far as it
+//! can, and slides along what limits it. A leg at the end of its range would hold up the torso for good, and with
+//! it everything that keeps the balance.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
+
+use super::support::{edges, from_above};
+use crate::{
+    collision::{Ground, Part},
+    joints::{JointVector, Leg},
+    kinematics::{FootKinematics, body_poses},
+    model::Model,
+    polyhedron::Polyhedron,
+};
+
+/// An angle of a radian counts like so many metres: at about this distance from the torso are its feet.
+const METRES_PER_RADIAN: f64 = 0.3;
+/// Distance kept from the ends of the joints' ranges, rad: what the whole-body controller stops is never asked for.
+const MARGIN_RAD: f64 = 0.05;
+/// Longest steps, m and rad: beyond, the half-spaces are no longer what they were.
+const LONGEST_M: f64 = 0.02;
+const LONGEST_RAD: f64 = 0.05;
+/// Steps in each control period.
+const STEPS: usize = 2;
+/// Damping of J⁻¹, m/rad: a leg of 0.213 m links has less only within 0.1 of a straight knee.
+const DAMPING: f64 = 0.01;
+
+/// What the torso stands on.
+#[derive(Debug, Clone, Copy)]
+pub struct Footing<'a> {
+    /// The legs that stand, and where in the world.
+    pub feet: &'a [(Leg, Vector3<f64>)],
+    /// From the torso's origin to the centre of mass, seen from above, along the world's axes, m.
+    pub com_from_torso: Vector2<f64>,
+    /// How far inside the polygon of the feet the centre of mass stays, m.
+    pub margin_m: f64,
+    /// Height of the ground in the world, m.
+    pub ground_m: f64,
+    /// Least height above it of the arms' mounts, m.
+    pub clearance_m: f64,
+}
+
+/// A torso that reaches for a target.
+#[derive(Debug, Clone)]
+pub struct TorsoReach {
+    torso: Isometry3<f64>,
+    joints: JointVector,
+    polyhedron: Polyhedron,
+}
+
+impl TorsoReach {
+    /// Starts there, at these joint angles.
+    pub fn new(torso: &Isometry3<f64>, joints: &JointVector) -> Self {
+        Self { torso: *torso, joints: *joints, polyhedron: Polyhedron::new() }
+    }
+
+    /// The pose nearest to a target that the legs can hold. Allocates nothing.
+    pub fn nearest(
+        &mut self,
+        model: &Model,
+        footing: &Footing<'_>,
+        target: &Isometry3<f64>,
+    ) -> Isometry3<f64> {
+        for _ in 0..STEPS {
+            self.step(model, footing, target);
+        }
+        self.torso
+    }
+
+    fn step(&mut self, model: &Model, footing: &Footing<'_>, target: &Isometry3<f64>) {
+        let way = target.translation.vector - self.torso.translation.vector;
+        let turn = (target.rotation * self.torso.rotation.inverse()).scaled_axis();
+        let mut wanted = Vector6::zeros();
+        wanted.fixed_rows_mut::<3>(0).copy_from(&way.cap_magnitude(LONGEST_M));
+        wanted.fixed_rows_mut::<3>(3).copy_from(&turn.cap_magnitude(LONGEST_RAD));
+        self.polyhedron.clear();
+        self.keep_over_the_feet(footing, &wanted);
+        let ground = Ground::at(footing.ground_m, &self.torso);
+        for (leg, foot) in footing.feet {
+            let of_joints = self.follow(model, *leg, foot);
+            self.keep_joints_in_range(model, *leg, &of_joints, &wanted);
+            if leg.side().is_some() {
+                self.keep_mount_up(model, *leg, &of_joints, &ground, footing.clearance_m, &wanted);
+            }
+        }
+        let mut step = wanted;
+        if !self.polyhedron.contains_zero() {
+            let mut metric = Matrix6::identity();
+            metric.fixed_view_mut::<3, 3>(3, 3).scale_mut(METRES_PER_RADIAN.powi(2));
+            step += self.polyhedron.nearest(&metric).unwrap_or(-wanted);
+        }
+        let way = step.fixed_rows::<3>(0).into_owned().cap_magnitude(LONGEST_M);
+        let turn = step.fixed_rows::<3>(3).into_owned().cap_magnitude(LONGEST_RAD);
+        self.torso.translation.vector += way;
+        self.torso.rotation = UnitQuaternion::from_scaled_axis(turn) * self.torso.rotation;
+        self.torso.rotation.renormalize();
+    }
+
+    fn keep_over_the_feet(&mut self, footing: &Footing<'_>, wanted: &Vector6<f64>) {
+        let (mut feet, count) = ([Vector2::zeros(); 4], footing.feet.len().min(4));
+        for (place, (_, foot)) in feet.iter_mut().zip(footing.feet) {
+            *place = from_above(foot);
+        }
+        let com = from_above(&self.torso.translation.vector) + footing.com_from_torso;
+        for (corner, inwards) in edges(&feet[..count]) {
+            let row = Vector6::new(inwards.x, inwards.y, 0.0, 0.0, 0.0, 0.0);
+            self.keep(&row, inwards.dot(&(com - corner)) - footing.margin_m, wanted);
+        }
+    }
+
+    /// Brings a leg to its foot. How its joints then turn with the torso.
+    fn follow(&mut self, model: &Model, leg: Leg, foot: &Vector3<f64>) -> [Vector6<f64>; 3] {
+        let kinematics = FootKinematics::new(model, &self.joints, leg);
+        let square = kinematics.linear.tr_mul(&kinematics.linear) + Matrix3::identity() * DAMPING.powi(2);
+        let inverse = square.try_inverse().unwrap_or_default() * kinematics.linear.transpose();
+        let first = leg.first_joint();
+        let lacking = self.torso.inverse_transform_point(&(*foot).into()).coords - kinematics.position();
+        let change = inverse * lacking;
+        for joint in 0..3 {
+            self.joints[first + joint] += change[joint];
+        }
+        let by_foot = inverse * self.torso.rotation.to_rotation_matrix().matrix().transpose();
+        let lever = foot - self.torso.translation.vector;
+        std::array::from_fn(|joint| {
+            let along = by_foot.row(joint).transpose();
+            let turning = along.cross(&lever);
+            Vector6::new(-along.x, -along.y, -along.z, turning.x, turning.y, turning.z)
+        })
+    }
+
+    fn keep_joints_in_range(
+        &mut self,
+        model: &Model,
+        leg: Leg,
+        of_joints: &[Vector6<f64>; 3],
+        wanted: &Vector6<f64>,
+    ) {
+        for (joint, row) in (leg.first_joint()..).zip(of_joints) {
+            let angle = self.joints[joint];
+            self.keep(row, angle - model.lower[joint] - MARGIN_RAD, wanted);
+            self.keep(&-row, model.upper[joint] - MARGIN_RAD - angle, wanted);
+        }
+    }
+
+    fn keep_mount_up(
+        &mut self,
+        model: &Model,
+        leg: Leg,
+        of_joints: &[Vector6<f64>; 3],
+        ground: &Ground,
+        clearance_m: f64,
+        wanted: &Vector6<f64>,
+    ) {
+        let bodies = body_poses(model, &self.joints);
+        for end in ground.altitudes(leg, &model.collision, &bodies) {
+            if end.link.part != Part::Mount {
+                continue;
+            }
+            let gradient = end.gradient(ground, &bodies);
+            let lever = (self.torso.rotation * end.center).cross(&Vector3::z());
+            let mut row = Vector6::new(0.0, 0.0, 1.0, lever.x, lever.y, lever.z);
+            for (joint, of_joint) in (leg.first_joint()..).zip(of_joints) {
+                row += of_joint * gradient[joint];
+            }
+            self.keep(&row, end.height - clearance_m, wanted);
+        }
+    }
+
+    /// What is left of a limit may be used up.
+    fn keep(&mut self, row: &Vector6<f64>, room: f64, wanted: &Vector6<f64>) {
+        self.polyhedron.push(*row, -room - row.dot(wanted));
+    }
+}
+
+#[cfg(test)]
+mod tests;
