@@ -99,8 +99,8 @@ impl Default for StopSettings {
             rate: 15.0,
             braking: 40.0,
             max_acceleration: 100.0,
-            speed_share: 0.7,
-            step_time_s: 0.02,
+            speed_share: 0.6,
+            step_time_s: 0.015,
             collision_margin: 0.01,
             ground_clearance: 0.01,
         }
