@@ -13,7 +13,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
 
-use super::support::{edges, from_above};
+use super::{
+    limits::ReachRange,
+    support::{edges, from_above},
+};
 use crate::{
     collision::{Ground, Part},
     joints::{JointVector, Leg},
@@ -24,11 +27,9 @@ use crate::{
 
 /// An angle of a radian counts like so many metres: at about this distance from the torso are its feet.
 const METRES_PER_RADIAN: f64 = 0.3;
-/// Distance kept from the ends of the joints' ranges, rad: what the whole-body controller stops is never asked for.
-const MARGIN_RAD: f64 = 0.05;
-/// Longest steps, m and rad: beyond, the half-spaces are no longer what they were.
-const LONGEST_M: f64 = 0.02;
-const LONGEST_RAD: f64 = 0.05;
+/// How fast the solution moves at most, where limits turn it aside, m/s and rad/s; three times what a target does.
+const SPEED_M_S: f64 = 1.0;
+const SPEED_RAD_S: f64 = 3.0;
 /// Steps in each control period.
 const STEPS: usize = 2;
 /// Damping of J⁻¹, m/rad: a leg of 0.213 m links has less only within 0.1 of a straight knee.
@@ -45,8 +46,8 @@ pub struct Footing<'a> {
     pub margin_m: f64,
     /// Height of the ground in the world, m.
     pub ground_m: f64,
-    /// Least height above it of the arms' mounts, m.
-    pub clearance_m: f64,
+    /// Angles of the legs' joints, and the least height of the arms' mounts above the ground.
+    pub range: ReachRange,
 }
 
 /// A torso that reaches for a target.
@@ -63,33 +64,51 @@ impl TorsoReach {
         Self { torso: *torso, joints: *joints, polyhedron: Polyhedron::new() }
     }
 
-    /// The pose nearest to a target that the legs can hold. Allocates nothing.
+    /// The pose nearest to a target that the legs can hold by now. Allocates nothing.
     pub fn nearest(
         &mut self,
         model: &Model,
         footing: &Footing<'_>,
         target: &Isometry3<f64>,
+        dt_s: f64,
     ) -> Isometry3<f64> {
         for _ in 0..STEPS {
-            self.step(model, footing, target);
+            self.step(model, footing, target, dt_s / STEPS as f64);
         }
         self.torso
     }
 
-    fn step(&mut self, model: &Model, footing: &Footing<'_>, target: &Isometry3<f64>) {
+    fn step(&mut self, model: &Model, footing: &Footing<'_>, target: &Isometry3<f64>, dt_s: f64) {
         let way = target.translation.vector - self.torso.translation.vector;
         let turn = (target.rotation * self.torso.rotation.inverse()).scaled_axis();
         let mut wanted = Vector6::zeros();
-        wanted.fixed_rows_mut::<3>(0).copy_from(&way.cap_magnitude(LONGEST_M));
-        wanted.fixed_rows_mut::<3>(3).copy_from(&turn.cap_magnitude(LONGEST_RAD));
+        let within = |step: Vector6<f64>| {
+            let way = step.fixed_rows::<3>(0).norm() / SPEED_M_S;
+            let turn = step.fixed_rows::<3>(3).norm() / SPEED_RAD_S;
+            step * (dt_s / way.max(turn).max(dt_s))
+        };
+        wanted.fixed_rows_mut::<3>(0).copy_from(&way);
+        wanted.fixed_rows_mut::<3>(3).copy_from(&turn);
+        let wanted = within(wanted);
         self.polyhedron.clear();
         self.keep_over_the_feet(footing, &wanted);
+        let mut of_joints = [[Vector6::zeros(); 3]; 4];
+        for (of_joints, (leg, foot)) in of_joints.iter_mut().zip(footing.feet) {
+            *of_joints = self.follow(model, *leg, foot);
+            self.keep_in_range(*leg, &footing.range, of_joints, &wanted);
+        }
         let ground = Ground::at(footing.ground_m, &self.torso);
-        for (leg, foot) in footing.feet {
-            let of_joints = self.follow(model, *leg, foot);
-            self.keep_joints_in_range(model, *leg, &of_joints, &wanted);
-            if leg.side().is_some() {
-                self.keep_mount_up(model, *leg, &of_joints, &ground, footing.clearance_m, &wanted);
+        let bodies = body_poses(model, &self.joints);
+        for (of_joints, (leg, _)) in of_joints.iter().zip(footing.feet) {
+            let ends = ground.altitudes(*leg, &model.collision, &bodies);
+            for end in ends.filter(|end| end.link.part == Part::Mount) {
+                let gradient = end.gradient(&ground, &bodies);
+                let lever = (self.torso.rotation * end.center).cross(&Vector3::z());
+                let mut row = Vector6::new(0.0, 0.0, 1.0, lever.x, lever.y, lever.z);
+                for (joint, of_joint) in (leg.first_joint()..).zip(of_joints) {
+                    row += of_joint * gradient[joint];
+                }
+                self.keep(&row, end.height - footing.range.ground_m, &wanted);
             }
         }
         let mut step = wanted;
@@ -98,9 +117,9 @@ impl TorsoReach {
             metric.fixed_view_mut::<3, 3>(3, 3).scale_mut(METRES_PER_RADIAN.powi(2));
             step += self.polyhedron.nearest(&metric).unwrap_or(-wanted);
         }
-        let way = step.fixed_rows::<3>(0).into_owned().cap_magnitude(LONGEST_M);
-        let turn = step.fixed_rows::<3>(3).into_owned().cap_magnitude(LONGEST_RAD);
-        self.torso.translation.vector += way;
+        let step = within(step);
+        self.torso.translation.vector += step.fixed_rows::<3>(0);
+        let turn = step.fixed_rows::<3>(3).into_owned();
         self.torso.rotation = UnitQuaternion::from_scaled_axis(turn) * self.torso.rotation;
         self.torso.rotation.renormalize();
     }
@@ -137,41 +156,18 @@ impl TorsoReach {
         })
     }
 
-    fn keep_joints_in_range(
+    fn keep_in_range(
         &mut self,
-        model: &Model,
         leg: Leg,
+        range: &ReachRange,
         of_joints: &[Vector6<f64>; 3],
         wanted: &Vector6<f64>,
     ) {
-        for (joint, row) in (leg.first_joint()..).zip(of_joints) {
+        let ranges = [range.hip, range.thigh, range.calf];
+        for ((joint, row), range) in (leg.first_joint()..).zip(of_joints).zip(ranges) {
             let angle = self.joints[joint];
-            self.keep(row, angle - model.lower[joint] - MARGIN_RAD, wanted);
-            self.keep(&-row, model.upper[joint] - MARGIN_RAD - angle, wanted);
-        }
-    }
-
-    fn keep_mount_up(
-        &mut self,
-        model: &Model,
-        leg: Leg,
-        of_joints: &[Vector6<f64>; 3],
-        ground: &Ground,
-        clearance_m: f64,
-        wanted: &Vector6<f64>,
-    ) {
-        let bodies = body_poses(model, &self.joints);
-        for end in ground.altitudes(leg, &model.collision, &bodies) {
-            if end.link.part != Part::Mount {
-                continue;
-            }
-            let gradient = end.gradient(ground, &bodies);
-            let lever = (self.torso.rotation * end.center).cross(&Vector3::z());
-            let mut row = Vector6::new(0.0, 0.0, 1.0, lever.x, lever.y, lever.z);
-            for (joint, of_joint) in (leg.first_joint()..).zip(of_joints) {
-                row += of_joint * gradient[joint];
-            }
-            self.keep(&row, end.height - clearance_m, wanted);
+            self.keep(row, angle - range.min, wanted);
+            self.keep(&-row, range.max - angle, wanted);
         }
     }
 

@@ -200,10 +200,11 @@ impl Driving {
             com_from_torso,
             margin_m: self.limits.support_margin_m,
             ground_m: scene.ground(&setpoint.contacts),
-            clearance_m: self.limits.reach.ground_m,
+            range: self.limits.reach,
         };
         let reach = &mut self.torso_reach;
-        let permitted = |wanted: &Isometry3<f64>| reach.nearest(scene.model, &footing, &range.clamp(wanted));
+        let permitted =
+            |wanted: &Isometry3<f64>| reach.nearest(scene.model, &footing, &range.clamp(wanted), scene.dt_s);
         match played {
             Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
             None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
