@@ -77,4 +77,10 @@ impl Side {
     pub const fn first_arm_joint(self) -> usize {
         12 + 3 * self as usize
     }
+
+    /// Hip, thigh, calf and the arm's three joints.
+    pub const fn limb_joints(self) -> [usize; 6] {
+        let (leg, arm) = (self.leg().first_joint(), self.first_arm_joint());
+        [leg, leg + 1, leg + 2, arm, arm + 1, arm + 2]
+    }
 }

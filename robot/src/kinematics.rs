@@ -172,8 +172,7 @@ pub struct GripperKinematics {
 impl GripperKinematics {
     /// Kinematics of one side's gripper.
     pub fn new(model: &Model, position: &JointVector, side: Side) -> Self {
-        let (leg, arm) = (side.leg().first_joint(), side.first_arm_joint());
-        let joints = [leg, leg + 1, leg + 2, arm, arm + 1, arm + 2];
+        let joints = side.limb_joints();
         let (mut rotation, mut origin) = (Matrix3::identity(), Vector3::zeros());
         let (mut axes, mut origins) = ([Vector3::zeros(); 6], [Vector3::zeros(); 6]);
         for (column, joint) in joints.into_iter().enumerate() {

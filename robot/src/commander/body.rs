@@ -93,6 +93,11 @@ impl DrivenBody {
         });
     }
 
+    /// The body is brought along another way; from there it goes on.
+    pub fn carry(&mut self, reference: PoseReference) {
+        self.follower.place(reference);
+    }
+
     /// One control step. `permitted` takes a wanted target to the nearest one inside the limits, which may
     /// move: a body that nobody drives gives way to them, and comes back when they do.
     pub fn advance(

@@ -59,6 +59,11 @@ impl PoseFollower {
         &self.reference
     }
 
+    /// Goes on from there, as that moves.
+    pub fn place(&mut self, reference: PoseReference) {
+        self.reference = reference;
+    }
+
     /// The target at which the follower comes to rest without turning back: ahead by ẋ/ω, or by the braking
     /// distance if that is longer.
     pub fn stopping_pose(&self) -> Isometry3<f64> {

@@ -20,6 +20,11 @@ impl Range {
         Self { min: -half, max: half }
     }
 
+    /// Whether a value is inside.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.min..=self.max).contains(&value)
+    }
+
     /// The nearest value inside.
     pub fn clamp(&self, value: f64) -> f64 {
         value.max(self.min).min(self.max)

@@ -27,7 +27,7 @@ pub use foot_reach::FootReach;
 pub use limits::{LimbRange, Limits, Range, RateLimits, ReachRange, TorsoRange};
 pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
-pub use reach::Reach;
+pub use reach::{LimbReference, Reach};
 pub use reference::{PoseReference, rebased_point};
 pub use support::{deepest_margin, from_above, push_inside};
 pub use torso_reach::{Footing, TorsoReach};

@@ -10,16 +10,32 @@
 //! ```
 //! by damped Gauss-Newton steps from the last solution, each brought to the nearest step that the limits permit
 //! ([`crate::polyhedron`]). With the joints' speed bounded, the solution is a path that the limb can follow.
+//!
+//! Led far around, such an iteration ends where it cannot get out: a wrist at the end of its range, from where
+//! the way back is the other way round. So while a target is missed, the joint angles that meet it are computed
+//! in closed form ([`branches`]). When some of them are inside all limits, and far from the present ones, until
+//! [`PATIENCE_M_S`] is used up, the limb makes a [detour](Detour) to them through the space of its joints, inside
+//! the same limits. A target that nothing meets exactly causes none, nor does one that the joints are on their
+//! way to; what a detour did not come to because the robot itself bars the way is not tried again.
+
+mod branches;
+mod detour;
+mod walls;
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::limits::{Range, ReachRange};
+use self::{branches::branches, detour::Detour, walls::Walls};
+use super::{
+    limits::{Range, ReachRange},
+    reference::PoseReference,
+};
 use crate::{
-    collision::{Clearances, Ground},
+    collision::Ground,
     joints::{JointVector, Side},
-    kinematics::{GripperKinematics, body_poses},
+    kinematics::{FootKinematics, GripperKinematics},
     model::Model,
     polyhedron::Polyhedron,
+    wbc::PointReference,
 };
 
 /// L: an error of a radian counts like this many metres. At the wrist's distance from the grasp centre.
@@ -31,43 +47,147 @@ const SPEED_SHARE: f64 = 0.5;
 const SPEED_RAD_S: f64 = 4.0;
 /// Distance kept from the ends of the joints' ranges, rad.
 const MARGIN_RAD: f64 = 0.03;
-/// Links nearer than this beyond their clearance are looked at, m.
-const INFLUENCE_M: f64 = 0.03;
 /// The solution stays so near to what the limb is asked for, rad: it does not go over to a posture in which the limb
 /// is not.
 const LEAD_RAD: f64 = 0.6;
+/// Links that are too near are taken apart at this speed, m/s.
+const RECOVERY_M_S: f64 = 0.5;
+/// A detour begins where the limb is, which may be beyond these limits by what the controller's are wider: it is
+/// brought inside by this share of the speed.
+const DETOUR_RECOVERY: f64 = 0.25;
 /// Steps in each control period: a reachable target is met to a hundredth of a millimetre.
 const STEPS: usize = 3;
+/// A target is missed beyond this, m: much more than what is left of one that the joints follow.
+const MISSED_M: f64 = 0.005;
+/// Joint angles nearer than this are found by the iteration itself, rad.
+const NEAR_RAD: f64 = 0.5;
+/// A target that could be met may be missed by so much for so long before the limb makes a detour, m s: by 10 cm
+/// for 0.3 s, in which joints at their greatest speed get to where they are late, by 1 cm for 3 s.
+const PATIENCE_M_S: f64 = 0.03;
 
 /// Leg and arm that reach for a target.
 #[derive(Debug, Clone)]
 pub struct Reach {
     side: Side,
     joints: JointVector,
+    /// What was asked of the limb last.
+    desired: Vector6<f64>,
     range: ReachRange,
-    clearances: Clearances,
+    walls: Walls,
     polyhedron: Polyhedron,
+    /// By how much for how long the target has been missed although other joint angles meet it, m s.
+    missed_m_s: f64,
+    detour: Option<Detour>,
+    /// Where a detour did not arrive: not tried again until a target is met.
+    barred: Option<Vector6<f64>>,
 }
 
-/// How a distance, of two links or of one from the ground, depends on the six joints.
+/// A change of the six joints that limits may change.
 #[derive(Debug, Clone, Copy)]
-struct Wall {
-    /// What is left of it, m.
-    room: f64,
-    /// m/rad
-    slope: Vector6<f64>,
+struct Wish {
+    change: Vector6<f64>,
+    /// In which what comes nearest to it is found.
+    metric: Matrix6<f64>,
+    /// How fast what is beyond a limit is brought back, as a share of what is possible.
+    recovery: f64,
 }
 
-/// The most walls that are looked at: with the six joints' ends as many as the polyhedron takes.
-const WALLS: usize = Polyhedron::MOST - 12;
+/// How a limb moves on a detour, in and relative to the torso's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimbReference {
+    /// Its gripper.
+    pub gripper: PoseReference,
+    /// Its foot.
+    pub foot: PointReference,
+    /// The joints of its arm.
+    pub arm: PointReference,
+}
 
 impl Reach {
     /// Starts at these joint angles.
     pub fn new(side: Side, joints: &JointVector, range: ReachRange) -> Self {
-        Self { side, joints: *joints, range, clearances: Clearances::new(), polyhedron: Polyhedron::new() }
+        Self {
+            side,
+            joints: *joints,
+            desired: of_limb(joints, side),
+            range,
+            walls: Walls::new(side, range),
+            polyhedron: Polyhedron::new(),
+            missed_m_s: 0.0,
+            detour: None,
+            barred: None,
+        }
     }
 
-    fn range(&self, model: &Model, column: usize, joint: usize) -> Range {
+    /// The nearest pose to `torso_from_target` that can be reached by now. The robot's joints are asked to be at
+    /// `desired`, the ground is there. Allocates nothing.
+    pub fn nearest(
+        &mut self,
+        model: &Model,
+        desired: &JointVector,
+        ground: &Ground,
+        torso_from_target: &Isometry3<f64>,
+        dt_s: f64,
+    ) -> Isometry3<f64> {
+        let limb = self.limb();
+        self.joints = *desired;
+        self.place(&limb);
+        self.decide(model, desired, ground, torso_from_target, dt_s);
+        self.desired = of_limb(desired, self.side);
+        self.walls.find(model, &self.joints, ground);
+        if let Some(detour) = self.detour {
+            let change = detour.change(&self.limb(), dt_s);
+            let wish = Wish { change, metric: Matrix6::identity(), recovery: DETOUR_RECOVERY };
+            let change = self.go(model, desired, &wish, dt_s);
+            self.detour = Some(detour.after(&change, &self.limb(), dt_s));
+        } else {
+            for _ in 0..STEPS {
+                self.step(model, desired, torso_from_target, dt_s / STEPS as f64);
+            }
+        }
+        self.pose(model)
+    }
+
+    /// The limb's motion while it makes a detour, which its gripper's pose alone does not tell.
+    pub fn detour(&self, model: &Model) -> Option<LimbReference> {
+        let detour = self.detour.as_ref()?;
+        let (leg, arm) = (detour.velocity().fixed_rows::<3>(0), detour.velocity().fixed_rows::<3>(3));
+        let gripper = GripperKinematics::new(model, &self.joints, self.side);
+        let twist = gripper.jacobian * detour.velocity();
+        let foot = FootKinematics::new(model, &self.joints, self.side.leg());
+        let mut reference = PoseReference::hold(&gripper.torso_from_gripper);
+        reference.point.velocity = twist.fixed_rows::<3>(0).into_owned();
+        reference.rotation.angular_velocity = twist.fixed_rows::<3>(3).into_owned();
+        let moving = |position, velocity| PointReference { velocity, ..PointReference::hold(position) };
+        Some(LimbReference {
+            gripper: reference,
+            foot: moving(foot.position(), foot.linear * leg),
+            arm: moving(self.limb().fixed_rows::<3>(3).into_owned(), arm.into_owned()),
+        })
+    }
+
+    /// Ends a detour where it is.
+    pub fn stay(&mut self) {
+        self.detour = None;
+        self.missed_m_s = 0.0;
+    }
+
+    fn limb(&self) -> Vector6<f64> {
+        of_limb(&self.joints, self.side)
+    }
+
+    fn place(&mut self, limb: &Vector6<f64>) {
+        for (joint, angle) in self.side.limb_joints().into_iter().zip(limb.iter()) {
+            self.joints[joint] = *angle;
+        }
+    }
+
+    fn pose(&self, model: &Model) -> Isometry3<f64> {
+        GripperKinematics::new(model, &self.joints, self.side).torso_from_gripper
+    }
+
+    fn range(&self, model: &Model, column: usize) -> Range {
+        let joint = self.side.limb_joints()[column];
         match column {
             0 => self.range.hip,
             1 => self.range.thigh,
@@ -77,70 +197,72 @@ impl Reach {
         }
     }
 
-    /// The nearest pose to `torso_from_target` that can be reached by now; the other limbs are at `others`, the
-    /// ground is there. Allocates nothing.
-    pub fn nearest(
+    /// Whether a detour is made, and where to.
+    fn decide(
         &mut self,
         model: &Model,
-        others: &JointVector,
+        desired: &JointVector,
         ground: &Ground,
-        torso_from_target: &Isometry3<f64>,
-        dt_s: f64,
-    ) -> Isometry3<f64> {
-        let now = GripperKinematics::new(model, &self.joints, self.side);
-        let mut posture = *others;
-        for joint in now.joints {
-            posture[joint] = self.joints[joint];
-        }
-        self.joints = posture;
-        let mut walls = [Wall { room: 0.0, slope: Vector6::zeros() }; WALLS];
-        let count = self.walls(model, &now.joints, ground, &mut walls);
-        for _ in 0..STEPS {
-            self.step(model, others, torso_from_target, &mut walls[..count], dt_s / STEPS as f64);
-        }
-        GripperKinematics::new(model, &self.joints, self.side).torso_from_gripper
-    }
-
-    /// Finds what this limb's links are near.
-    fn walls(
-        &mut self,
-        model: &Model,
-        joints: &[usize; 6],
-        ground: &Ground,
-        walls: &mut [Wall; WALLS],
-    ) -> usize {
-        let bodies = body_poses(model, &self.joints);
-        let pairs = model.collision.pairs_of(self.side);
-        let clearance_m = self.range.clearance_m;
-        self.clearances.update(&model.collision, pairs, &bodies, clearance_m + INFLUENCE_M);
-        let from_links = self.clearances.near().iter().map(|near| {
-            let gradient = near.gradient(&bodies);
-            let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
-            Wall { room: near.distance - clearance_m, slope }
-        });
-        let ends = ground.altitudes(self.side.leg(), &model.collision, &bodies);
-        let from_ground = ends.filter_map(|end| {
-            let room = end.height - self.range.ground_m;
-            let gradient = end.gradient(ground, &bodies);
-            let slope = Vector6::from_fn(|column, _| gradient[joints[column]]);
-            (room < INFLUENCE_M).then_some(Wall { room, slope })
-        });
-        let mut count = 0;
-        for (place, wall) in walls.iter_mut().zip(from_ground.chain(from_links)) {
-            *place = wall;
-            count += 1;
-        }
-        count
-    }
-
-    fn step(
-        &mut self,
-        model: &Model,
-        limb: &JointVector,
         target: &Isometry3<f64>,
-        walls: &mut [Wall],
         dt_s: f64,
     ) {
+        let here = self.limb();
+        if let Some(mut detour) = self.detour {
+            if let Some(goal) = self.solution(model, ground, target, detour.goal()) {
+                detour.aim(&goal);
+            }
+            if detour.has_stopped() && !are_near(detour.goal(), &here) {
+                self.barred = Some(*detour.goal());
+            }
+            self.detour = Some(detour).filter(|detour| !detour.is_over(&here) && !detour.has_stopped());
+            return;
+        }
+        let miss = miss(target, &self.pose(model));
+        let missed = miss > MISSED_M;
+        self.barred = self.barred.filter(|_| missed);
+        let other = if missed { self.solution(model, ground, target, &here) } else { None };
+        let is_barred = |goal: &Vector6<f64>| self.barred.is_some_and(|barred| are_near(&barred, goal));
+        let Some(goal) = other.filter(|goal| !are_near(goal, &here) && !is_barred(goal)) else {
+            self.missed_m_s = 0.0;
+            return;
+        };
+        self.missed_m_s += miss * dt_s;
+        if self.missed_m_s > PATIENCE_M_S {
+            self.missed_m_s = 0.0;
+            let (before, now) = (self.desired, of_limb(desired, self.side));
+            self.place(&now);
+            self.detour = Some(Detour::new(goal, &((now - before) / dt_s)));
+        }
+    }
+
+    /// The joint angles nearest to `near` that meet a target and are permitted.
+    fn solution(
+        &mut self,
+        model: &Model,
+        ground: &Ground,
+        target: &Isometry3<f64>,
+        near: &Vector6<f64>,
+    ) -> Option<Vector6<f64>> {
+        let here = self.limb();
+        let mut nearest: Option<Vector6<f64>> = None;
+        let distance = |limb: &Vector6<f64>| (limb - near).amax();
+        for limb in branches(model, self.side, target) {
+            let inside =
+                limb.iter().enumerate().all(|(column, angle)| self.range(model, column).contains(*angle));
+            if !inside || nearest.is_some_and(|nearest| distance(&nearest) <= distance(&limb)) {
+                continue;
+            }
+            self.place(&limb);
+            self.walls.find(model, &self.joints, ground);
+            if self.walls.least_room() >= 0.0 {
+                nearest = Some(limb);
+            }
+        }
+        self.place(&here);
+        nearest
+    }
+
+    fn step(&mut self, model: &Model, desired: &JointVector, target: &Isometry3<f64>, dt_s: f64) {
         let now = GripperKinematics::new(model, &self.joints, self.side);
         let mut error = Vector6::zeros();
         let moved = target.translation.vector - now.torso_from_gripper.translation.vector;
@@ -152,36 +274,50 @@ impl Reach {
 
         let hessian = jacobian.tr_mul(&jacobian) + DAMPING * Matrix6::identity();
         let Some(factor) = hessian.cholesky() else { return };
-        let free = factor.solve(&jacobian.tr_mul(&error));
+        let change = factor.solve(&jacobian.tr_mul(&error));
+        self.go(model, desired, &Wish { change, metric: hessian, recovery: 1.0 }, dt_s);
+    }
+
+    /// Changes the joints as wished, or as near to it as the limits permit. Returns the change.
+    fn go(&mut self, model: &Model, desired: &JointVector, wish: &Wish, dt_s: f64) -> Vector6<f64> {
+        let Wish { change: wanted, metric, recovery } = wish;
         self.polyhedron.clear();
-        for (column, joint) in now.joints.into_iter().enumerate() {
-            let range = self.range(model, column, joint);
+        for (column, joint) in self.side.limb_joints().into_iter().enumerate() {
+            let range = self.range(model, column);
             let range = Range {
-                min: range.min.max(limb[joint] - LEAD_RAD).min(range.max),
-                max: range.max.min(limb[joint] + LEAD_RAD).max(range.min),
+                min: range.clamp(desired[joint] - LEAD_RAD),
+                max: range.clamp(desired[joint] + LEAD_RAD),
             };
             let most = dt_s * SPEED_RAD_S.min(SPEED_SHARE * model.max_velocity[joint]);
             let angle = self.joints[joint];
             let unit = Vector6::ith(column, 1.0);
-            self.polyhedron.push(unit, (range.min - angle).clamp(-most, most) - free[column]);
-            self.polyhedron.push(-unit, (angle - range.max).clamp(-most, most) + free[column]);
+            self.polyhedron.push(unit, (range.min - angle).clamp(-most, recovery * most) - wanted[column]);
+            self.polyhedron.push(-unit, (angle - range.max).clamp(-most, recovery * most) + wanted[column]);
         }
-        for wall in walls.iter() {
-            // Links that are too near are taken apart at half a metre a second.
-            self.polyhedron.push(wall.slope, (-wall.room).min(0.5 * dt_s) - wall.slope.dot(&free));
-        }
+        self.walls.enclose(&mut self.polyhedron, wanted, recovery * RECOVERY_M_S * dt_s);
         let change = if self.polyhedron.contains_zero() {
-            free
+            *wanted
         } else {
-            free + self.polyhedron.nearest(&hessian).unwrap_or(-free)
+            wanted + self.polyhedron.nearest(metric).unwrap_or(-wanted)
         };
-        for (joint, change) in now.joints.into_iter().zip(change.iter()) {
-            self.joints[joint] += change;
-        }
-        for wall in walls {
-            wall.room += wall.slope.dot(&change);
-        }
+        self.place(&(self.limb() + change));
+        self.walls.pass(&change);
+        change
     }
+}
+
+fn of_limb(joints: &JointVector, side: Side) -> Vector6<f64> {
+    side.limb_joints().map(|joint| joints[joint]).into()
+}
+
+fn are_near(first: &Vector6<f64>, second: &Vector6<f64>) -> bool {
+    (first - second).amax() < NEAR_RAD
+}
+
+/// √ of what is minimized, m.
+fn miss(target: &Isometry3<f64>, reached: &Isometry3<f64>) -> f64 {
+    let moved = (target.translation.vector - reached.translation.vector).norm();
+    moved.hypot(METRES_PER_RADIAN * target.rotation.angle_to(&reached.rotation))
 }
 
 #[cfg(test)]

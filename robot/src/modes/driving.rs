@@ -7,7 +7,7 @@ use crate::{
     collision::Ground,
     commander::{
         Command, DrivenBody, FootReach, Footing, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
-        TorsoReach, from_above,
+        TorsoReach, from_above, rebased_point,
     },
     joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
@@ -176,6 +176,7 @@ impl Driving {
     fn release(&mut self) {
         self.torso.release();
         self.limb.release();
+        self.gripper_reach.stay();
         self.player = None;
     }
 
@@ -235,7 +236,8 @@ impl Driving {
         setpoint.lift(side, self.limb.reference().point);
     }
 
-    /// The gripper, within its box, above the ground, within reach.
+    /// The gripper, within its box, within reach. On a detour to another posture foot and arm are led in its place:
+    /// its pose alone would leave the controller in the posture that the limb is to leave.
     fn move_gripper(
         &mut self,
         side: Side,
@@ -260,6 +262,13 @@ impl Driving {
             }
             None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
         }
-        setpoint.grasp(side, *self.limb.reference());
+        match self.gripper_reach.detour(scene.model) {
+            None => setpoint.grasp(side, *self.limb.reference()),
+            Some(motion) => {
+                self.limb.carry(motion.gripper.rebased(&world_from_torso));
+                setpoint.lift(side, rebased_point(&motion.foot, &world_from_torso));
+                setpoint.hold_arm(side, motion.arm);
+            }
+        }
     }
 }

@@ -63,7 +63,7 @@ impl Setpoint {
         self.row = &table::STANCE;
     }
 
-    /// A front foot is in the air, there; its arm keeps its posture.
+    /// A front foot is in the air, there; its arm has a posture of its own.
     pub fn lift(&mut self, side: Side, foot: PointReference) {
         self.row = &table::SINGLE_FOOT[side.index()];
         self.feet[side.leg().index()] = foot;
