@@ -13,8 +13,6 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-/// The most that act at once.
-const MOST_ACTIVE: usize = 12;
 /// ρ, against rows of about length 1 in z: what is permitted is exceeded by a millionth of the multiplier.
 const SOFTNESS: f64 = 1e-6;
 /// Rows shorter than this in z cannot be changed by the joints.
@@ -79,41 +77,35 @@ impl Polyhedron {
     }
 }
 
-/// The constraints that act, and their multipliers.
+/// The constraints that act, and their multipliers: with the slack there may be more of them than dimensions.
 struct Active {
-    index: [usize; MOST_ACTIVE],
-    multiplier: [f64; MOST_ACTIVE],
+    index: [usize; Polyhedron::MOST],
+    multiplier: [f64; Polyhedron::MOST],
     count: usize,
 }
 
 /// The shortest z with c_i · z + s_i ≥ b_i, for rows c_i of length 1.
 fn least_norm(rows: &[Vector6<f64>], bounds: &[f64]) -> Vector6<f64> {
     /// Far more than are ever needed.
-    const ROUNDS: usize = 100;
+    const ROUNDS: usize = 4 * Polyhedron::MOST;
     let mut z = Vector6::zeros();
-    let mut active = Active { index: [0; MOST_ACTIVE], multiplier: [0.0; MOST_ACTIVE], count: 0 };
+    let mut active = Active { index: [0; Polyhedron::MOST], multiplier: [0.0; Polyhedron::MOST], count: 0 };
     let mut entering: Option<(usize, f64)> = None;
     for _ in 0..ROUNDS {
-        let (new, multiplier) = match entering {
-            Some(entering) => entering,
-            None => match active.worst(rows, bounds, &z) {
-                Some(index) if active.count < MOST_ACTIVE => (index, 0.0),
-                _ => break,
-            },
+        let Some((new, multiplier)) = entering.or_else(|| Some((active.worst(rows, bounds, &z)?, 0.0)))
+        else {
+            break;
         };
+        let Some(falls) = active.falls(rows, &rows[new]) else { break };
         // Along `way` the new constraint is approached while those that act stay as they are.
-        let give = active.give(rows, &rows[new]);
-        let mut way = rows[new];
-        for (slot, give) in give.iter().enumerate().take(active.count) {
-            way -= rows[active.index[slot]] * *give;
-        }
+        let way = falls * SOFTNESS;
         let gain = rows[new].dot(&way) + SOFTNESS;
         let full = (bounds[new] - rows[new].dot(&z) - SOFTNESS * multiplier) / gain;
-        let (blocking, longest) = active.longest_step(&give);
+        let (blocking, longest) = active.longest_step(rows, &falls);
         let step = full.min(longest);
         z += way * step;
         for slot in 0..active.count {
-            active.multiplier[slot] -= step * give[slot];
+            active.multiplier[slot] -= step * rows[active.index[slot]].dot(&falls);
         }
         let multiplier = multiplier + step;
         if longest < full {
@@ -140,40 +132,23 @@ impl Active {
         worst.1
     }
 
-    /// (C Cᵀ + ρ)⁻¹ C c: by how much the multipliers fall for each unit of the new one.
-    fn give(&self, rows: &[Vector6<f64>], new: &Vector6<f64>) -> [f64; MOST_ACTIVE] {
-        let mut factor = [[0.0; MOST_ACTIVE]; MOST_ACTIVE];
-        let mut give = [0.0; MOST_ACTIVE];
-        for i in 0..self.count {
-            let row = &rows[self.index[i]];
-            for j in 0..=i {
-                let mut entry = row.dot(&rows[self.index[j]]) + if i == j { SOFTNESS } else { 0.0 };
-                for k in 0..j {
-                    entry -= factor[i][k] * factor[j][k];
-                }
-                factor[i][j] = if i == j { entry.max(1e-15).sqrt() } else { entry / factor[j][j] };
-            }
-            give[i] = row.dot(new);
-            for k in 0..i {
-                give[i] -= factor[i][k] * give[k];
-            }
-            give[i] /= factor[i][i];
+    /// y = (ρ + Cᵀ C)⁻¹ c. With each unit of the new multiplier, those that act fall by
+    /// (C Cᵀ + ρ)⁻¹ C c = C y, and z moves by c - Cᵀ C y = ρ y.
+    fn falls(&self, rows: &[Vector6<f64>], new: &Vector6<f64>) -> Option<Vector6<f64>> {
+        let mut square = Matrix6::identity() * SOFTNESS;
+        for index in &self.index[..self.count] {
+            square.ger(1.0, &rows[*index], &rows[*index], 1.0);
         }
-        for i in (0..self.count).rev() {
-            for k in i + 1..self.count {
-                give[i] -= factor[k][i] * give[k];
-            }
-            give[i] /= factor[i][i];
-        }
-        give
+        square.cholesky().map(|factor| factor.solve(new))
     }
 
     /// The first multiplier to become zero, and after which step.
-    fn longest_step(&self, give: &[f64; MOST_ACTIVE]) -> (usize, f64) {
+    fn longest_step(&self, rows: &[Vector6<f64>], falls: &Vector6<f64>) -> (usize, f64) {
         let mut longest = (0, f64::INFINITY);
         for slot in 0..self.count {
-            if give[slot] > 1e-12 {
-                let step = (self.multiplier[slot] / give[slot]).max(0.0);
+            let fall = rows[self.index[slot]].dot(falls);
+            if fall > 1e-12 {
+                let step = (self.multiplier[slot] / fall).max(0.0);
                 if step < longest.1 {
                     longest = (slot, step);
                 }

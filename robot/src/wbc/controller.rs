@@ -1,11 +1,13 @@
 //! The control step: hierarchy, forces, torques.
 
+use nalgebra::Vector6;
+
 use super::{
     ContactSet, Objective, WbcFault, WbcOutput, WbcSettings, WbcStatus,
     force::ForceProblem,
     ground::{ForceDistribution, GroundReaction},
     objective::Robot,
-    stops::{MOST_HELD, Stops, Surroundings},
+    stops::{Stops, Surroundings},
     task::Task,
     tracking::Tracking,
 };
@@ -155,7 +157,7 @@ impl WholeBodyController {
     /// q̄ - q, dq̄ and ddq̄ of the last objective, within all limits.
     ///
     /// The contacts come first. They start the chains with q̄_0 = q, dq̄_0 = 0 and ddq̄_0 = J_c‡ (-J̇_c q̇): the
-    /// paper prints -J_c q̇, which has the unit of a velocity. Then come joints that have to be held.
+    /// paper prints -J_c q̇, which has the unit of a velocity.
     fn track(
         &mut self,
         model: &Model,
@@ -164,33 +166,29 @@ impl WholeBodyController {
         contacts: &ContactSet,
         status: &mut WbcStatus,
     ) {
-        self.tracking.begin(self.dynamics.mass_matrix());
-        for leg in contacts.legs() {
-            self.tracking.add(Task::contact(&self.dynamics, leg), 0.0);
-        }
-        let start = self.tracking.mark();
         let dynamics = &self.dynamics;
+        self.tracking.begin(dynamics.mass_matrix());
+        for leg in contacts.legs() {
+            self.tracking.add(Task::contact(dynamics, leg), 0.0);
+        }
+        let contact_levels = self.tracking.levels();
+        for objective in objectives {
+            let gains = self.settings.objectives.of(objective.kind());
+            match objective.task(&Robot { state, dynamics }, gains) {
+                Some(task) => self.tracking.add(task, gains.damping_start),
+                None => status.fault = Some(WbcFault::Reference),
+            }
+        }
+        let [contacts_only, wanted] = self.tracking.accelerations(contact_levels);
+        self.tracked = Tracked {
+            step: self.tracking.position_step(),
+            velocity: self.tracking.velocity(),
+            acceleration: bounded(&self.settings, &contacts_only, &wanted, status),
+        };
         let around = Surroundings { model, state, dynamics, contacts, objectives, settings: &self.settings };
         self.stops.begin(&around);
-        for _ in 0..=MOST_HELD {
-            self.tracking.rewind(start);
-            self.stops.for_each_held(|task, damping_start| self.tracking.add(task, damping_start));
-            for objective in objectives {
-                let gains = self.settings.objectives.of(objective.kind());
-                match objective.task(&Robot { state, dynamics }, gains) {
-                    Some(task) => self.tracking.add(task, gains.damping_start),
-                    None => status.fault = Some(WbcFault::Reference),
-                }
-            }
-            let [contacts_only, wanted] = self.tracking.accelerations(start);
-            self.tracked = Tracked {
-                step: self.tracking.position_step(),
-                velocity: self.tracking.velocity(),
-                acceleration: bounded(&self.settings, &contacts_only, &wanted, status),
-            };
-            if !self.stops.hold(&self.tracked, &self.settings) {
-                break;
-            }
+        if let Some(torso) = self.stops.restrain(&around, &self.tracked) {
+            follow(&mut self.tracking, &around, &torso, &mut self.tracked);
         }
         self.stops.restrict(&around, &mut self.tracked);
         status.limited = self.stops.joints();
@@ -229,19 +227,47 @@ impl WholeBodyController {
     }
 }
 
+/// Changes the torso's step, velocity and acceleration, and all joints with it: stance feet rest, and as far as the
+/// joints can do it, what the other objectives control goes on as it did.
+///
+/// It is the hierarchy of the change alone, which knows no targets but the torso's, and therefore linear in it.
+fn follow(tracking: &mut Tracking, around: &Surroundings, torso: &[Vector6<f64>; 3], tracked: &mut Tracked) {
+    let Surroundings { state, dynamics, settings, .. } = *around;
+    tracking.restart();
+    for leg in around.contacts.legs() {
+        tracking.add(Task::contact(dynamics, leg).unmoved(), 0.0);
+    }
+    for task in Task::torso(torso) {
+        tracking.add(task, 0.0);
+    }
+    for objective in around.objectives.iter().filter(|objective| !objective.kind().is_of_torso()) {
+        let gains = settings.objectives.of(objective.kind());
+        if let Some(task) = objective.task(&Robot { state, dynamics }, gains) {
+            tracking.add(task.unmoved(), gains.damping_start);
+        }
+    }
+    tracked.step += tracking.position_step();
+    tracked.velocity += tracking.velocity();
+    tracked.acceleration += tracking.accelerations(0)[1];
+}
+
 /// The objectives' acceleration, scaled back towards that of the contacts alone until all joints are below their
 /// limit. Every mixture of the two satisfies the contacts exactly; cutting joints one by one would not.
+///
+/// A tenth of the limit is always left to the objectives: were it nothing, the sign of the least wish would decide
+/// about all of them wherever the contacts alone take a joint beyond the limit.
 fn bounded(
     settings: &WbcSettings,
     contacts_only: &Motion,
     wanted: &Motion,
     status: &mut WbcStatus,
 ) -> Motion {
+    const LEAST_SHARE: f64 = 0.1;
     let limit = settings.max_joint_acceleration;
     let mut scale: f64 = 1.0;
     for index in DOF - JOINTS..DOF {
         let step = wanted[index] - contacts_only[index];
-        let room = (limit - contacts_only[index] * step.signum()).max(0.0);
+        let room = (limit - contacts_only[index] * step.signum()).max(LEAST_SHARE * limit);
         if step.abs() > room {
             scale = scale.min(room / step.abs());
         }

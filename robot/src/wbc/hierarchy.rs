@@ -45,12 +45,6 @@ pub(super) struct TaskChain<const N: usize> {
     coordinates: [[f64; DOF + 3]; N],
 }
 
-/// A chain as it was after some of its tasks: directions and solutions grow at their ends only.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Mark {
-    rank: usize,
-}
-
 /// What is left of a task: J_pre† = V S with V the directions that the chain keeps for it.
 #[derive(Debug, Clone)]
 pub(super) struct Projected {
@@ -75,16 +69,6 @@ impl<const N: usize> TaskChain<N> {
     /// Forgets all tasks.
     pub(super) const fn clear(&mut self) {
         self.rank = 0;
-    }
-
-    /// To come back to with [`Self::rewind`].
-    pub(super) const fn mark(&self) -> Mark {
-        Mark { rank: self.rank }
-    }
-
-    /// Forgets the tasks since a mark.
-    pub(super) const fn rewind(&mut self, mark: Mark) {
-        self.rank = mark.rank;
     }
 
     /// x of a right-hand side.

@@ -5,20 +5,23 @@
 //! goes further, it is replaced by the nearest one that does not; the other joints take over what they can.
 //! Cutting would leave the error to nobody, freezing would leave it for good.
 //!
-//! * Joints of a **standing leg** move with the torso. One that would go too far is held, with priority over all
-//!   objectives, and the hierarchy is solved again (Flacco, De Luca and Khatib, "Control of redundant robots under
-//!   hard joint constraints: saturation in the null space", IEEE Transactions on Robotics 31, 2015).
+//! * Joints of a **standing leg** move with the torso, because its foot rests: with J_t and J_l the foot's Jacobian
+//!   of the torso and of the leg's joints, a change of the torso's motion by d ∈ R⁶ changes theirs by
+//!   -J_l⁻¹ J_t d. The torso goes to the nearest motion that the limits of all standing legs permit, and the
+//!   other objectives follow it.
 //! * A **free limb** (a leg in the air with its arm, or the arm of a standing leg) moves nothing else: its joints
-//!   alone are changed, to the nearest motion that all its limits permit ([`crate::polyhedron`]), near in what the
-//!   limb's objectives see. Torso, stance feet and the other limb do not notice.
+//!   alone are changed, to the nearest motion that all its limits permit, near in what the limb's objectives see.
+//!   Torso, stance feet and the other limb do not notice.
+//!
+//! Both are projections onto polyhedra ([`crate::polyhedron`]), first the one, then the other, so that the command
+//! has no jump where a limit begins or ceases to act.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
 
 use super::{
     ContactSet, Objective, ObjectiveKind, Tracked, WbcSettings,
     barrier::{Interval, Window},
     objective::Robot,
-    task::Task,
 };
 use crate::{
     collision::{Altitude, Clearance, Clearances, Ground, Link, MOST_NEAR, Part},
@@ -27,12 +30,6 @@ use crate::{
     model::{FOOT_RADIUS_M, Frame, Model},
     polyhedron::Polyhedron,
 };
-
-/// What is held at once in the standing legs.
-pub(super) const MOST_HELD: usize = 6;
-
-/// Directions of a held joint that what stands before it has nearly used up fade out below this.
-const DAMPING_START: f64 = 0.1;
 
 /// Quantities other than joints: heights of capsules' ends, distances of pairs of links.
 const MOST_ROWS: usize = 24 + MOST_NEAR;
@@ -54,6 +51,16 @@ const METRES_PER_RADIAN: f64 = 0.05;
 /// Motion of a free limb's joints that its objectives do not see counts like so many metres for each radian: joints
 /// do not run about for the last millimetre.
 const METRES_PER_JOINT: f64 = 0.02;
+
+/// The same for the torso's orientation against its position, where standing legs limit both: half its length.
+const TORSO_METRES_PER_RADIAN: f64 = 0.2;
+
+/// λ of the damped inverse J_lᵀ (J_l J_lᵀ + λ²)⁻¹, m/rad: a leg whose least singular value is 20 times as long,
+/// nearly stretched, is still inverted to a quarter of a percent.
+const LEG_DAMPING: f64 = 1e-3;
+
+/// Joints of the legs; they come first.
+const LEG_JOINTS: usize = 12;
 
 /// What a row belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,9 +88,7 @@ struct Row {
 #[derive(Debug, Clone)]
 pub(super) struct Stops {
     joints: [Window; JOINTS],
-    /// Of standing legs.
-    held: [Option<[f64; 3]>; JOINTS],
-    /// Of free limbs, a bit for each.
+    /// Those that a solution took beyond their windows, a bit for each.
     stopped: u32,
     /// Legs in the air, by index.
     lifted: [bool; 4],
@@ -116,7 +121,6 @@ impl Stops {
         };
         Self {
             joints: [Window::free(); JOINTS],
-            held: [None; JOINTS],
             stopped: 0,
             lifted: [false; 4],
             rows: [row; MOST_ROWS],
@@ -126,10 +130,9 @@ impl Stops {
         }
     }
 
-    /// Finds what is permitted in a state. Nothing is held yet.
+    /// Finds what is permitted in a state. Nothing is stopped yet.
     pub(super) fn begin(&mut self, around: &Surroundings) {
         self.lifted = Leg::ALL.map(|leg| !around.contacts.contains(leg));
-        self.held = [None; JOINTS];
         (self.stopped, self.count) = (0, 0);
         self.limit_joints(around);
         self.limit_heights(around);
@@ -239,36 +242,47 @@ impl Stops {
         of_leg.chain(arm.into_iter().flat_map(|first| first..first + 3))
     }
 
-    /// Hands over each joint of a standing leg that is held.
-    pub(super) fn for_each_held(&self, mut add: impl FnMut(Task, f64)) {
-        for (joint, held) in self.held.iter().enumerate() {
-            if let Some([step, velocity, acceleration]) = *held {
-                let mut direction = [0.0; DOF];
-                direction[6 + joint] = 1.0;
-                add(Task::held(direction, step, velocity, acceleration), DAMPING_START);
-            }
+    /// The least changes of the torso's step, velocity and acceleration with which no joint of a standing leg exceeds
+    /// its limits; nothing where a solution already keeps to them.
+    pub(super) fn restrain(
+        &mut self,
+        around: &Surroundings,
+        solution: &Tracked,
+    ) -> Option<[Vector6<f64>; 3]> {
+        let stopped = Chain::ALL.map(|chain| self.exceeded(chain, solution));
+        if stopped == [0; 3] {
+            return None;
         }
+        self.stopped |= stopped[0] | stopped[1] | stopped[2];
+        let from_torso = legs_from_torso(around);
+        let mut metric = from_torso.tr_mul(&from_torso) * METRES_PER_JOINT.powi(2);
+        for axis in 0..6 {
+            metric[(axis, axis)] += if axis < 3 { 1.0 } else { TORSO_METRES_PER_RADIAN.powi(2) };
+        }
+        Some(Chain::ALL.map(|chain| {
+            self.polyhedron.clear();
+            for joint in self.standing_joints() {
+                let value = solution.chain(chain)[6 + joint];
+                let row = from_torso.row(joint).transpose();
+                self.polyhedron.enclose(row, chain.of(&self.joints[joint]), value);
+            }
+            self.polyhedron.nearest(&metric).unwrap_or_default()
+        }))
     }
 
-    /// Holds, in each standing leg, the joint that a solution takes furthest beyond what is permitted. Whether there
-    /// was any.
-    pub(super) fn hold(&mut self, solution: &Tracked, settings: &WbcSettings) -> bool {
-        let mut found = false;
-        for leg in Leg::ALL.into_iter().filter(|leg| !self.lifted[leg.index()]) {
+    /// The joints of standing legs that one chain takes beyond their limits, a bit for each.
+    fn exceeded(&self, chain: Chain, solution: &Tracked) -> u32 {
+        let exceeds = |joint: &usize| {
             // Rounding is no excess.
-            let mut worst = (1e-9, None);
-            for joint in leg.first_joint()..leg.first_joint() + 3 {
-                let excess = solution.excess(6 + joint, &self.joints[joint], settings.stops.rate);
-                if self.held[joint].is_none() && excess > worst.0 {
-                    worst = (excess, Some(joint));
-                }
-            }
-            if let Some(joint) = worst.1 {
-                self.held[joint] = Some(solution.within(6 + joint, &self.joints[joint]));
-                found = true;
-            }
-        }
-        found
+            chain.of(&self.joints[*joint]).excess(solution.chain(chain)[6 + joint]) > 1e-9
+        };
+        self.standing_joints().filter(exceeds).fold(0, |joints, joint| joints | 1 << joint)
+    }
+
+    fn standing_joints(&self) -> impl Iterator<Item = usize> + use<> {
+        let standing = Leg::ALL.map(|leg| (leg, !self.lifted[leg.index()]));
+        let legs = standing.into_iter().filter_map(|(leg, stands)| stands.then_some(leg));
+        legs.flat_map(|leg| leg.first_joint()..leg.first_joint() + 3)
     }
 
     /// Brings the joints of each free limb to the nearest motion that all its limits permit.
@@ -305,8 +319,7 @@ impl Stops {
             let interval = chain.of(&self.joints[joint]);
             let value = motion[6 + joint];
             let unit = Vector6::ith(place, 1.0);
-            self.polyhedron.push(unit, interval.lower() - value);
-            self.polyhedron.push(-unit, value - interval.upper());
+            self.polyhedron.enclose(unit, interval, value);
             if interval.excess(value) > 1e-9 {
                 self.stopped |= 1 << joint;
             }
@@ -323,9 +336,8 @@ impl Stops {
     }
 
     /// The joints that are limited, a bit for each.
-    pub(super) fn joints(&self) -> u32 {
-        let held = self.held.iter().enumerate().filter(|(_, held)| held.is_some());
-        held.fold(self.stopped, |joints, (joint, _)| joints | 1 << joint)
+    pub(super) const fn joints(&self) -> u32 {
+        self.stopped
     }
 
     /// Whether a link is kept above the ground.
@@ -366,6 +378,14 @@ impl Chain {
     }
 }
 
+impl Polyhedron {
+    /// Keeps a joint, of this value before the change, in an interval.
+    fn enclose(&mut self, row: Vector6<f64>, interval: &Interval, value: f64) {
+        self.push(row, interval.lower() - value);
+        self.push(-row, value - interval.upper());
+    }
+}
+
 impl Tracked {
     const fn chain(&self, chain: Chain) -> &Motion {
         match chain {
@@ -382,19 +402,23 @@ impl Tracked {
             Chain::Acceleration => &mut self.acceleration,
         }
     }
+}
 
-    /// How far one entry is beyond what is permitted, in the unit of a step: what the barrier would make of an
-    /// excess of velocity or acceleration.
-    fn excess(&self, index: usize, window: &Window, rate: f64) -> f64 {
-        let of_velocity = window.velocity.excess(self.velocity[index]) / rate;
-        let of_acceleration = window.acceleration.excess(self.acceleration[index]) / (rate * rate);
-        window.step.excess(self.step[index]).max(of_velocity).max(of_acceleration)
+/// How the joints of standing legs follow a change of the torso's motion: -J_l⁻¹ J_t, three rows for each leg; zero for
+/// legs in the air.
+fn legs_from_torso(around: &Surroundings) -> SMatrix<f64, LEG_JOINTS, 6> {
+    let mut legs = SMatrix::<f64, LEG_JOINTS, 6>::zeros();
+    for leg in around.contacts.legs() {
+        let jacobian = &around.dynamics.frame(Frame::Foot(leg)).jacobian;
+        let of_torso = jacobian.fixed_view::<3, 6>(0, 0);
+        let of_joints = jacobian.fixed_view::<3, 3>(0, 6 + leg.first_joint());
+        let square = of_joints * of_joints.transpose() + Matrix3::identity() * LEG_DAMPING.powi(2);
+        if let Some(inverse) = square.try_inverse() {
+            let mut rows = legs.fixed_rows_mut::<3>(leg.first_joint());
+            rows.copy_from(&(of_joints.tr_mul(&inverse) * of_torso * -1.0));
+        }
     }
-
-    /// The nearest values of one entry that are permitted.
-    fn within(&self, index: usize, window: &Window) -> [f64; 3] {
-        Chain::ALL.map(|chain| chain.of(window).nearest(self.chain(chain)[index]))
-    }
+    legs
 }
 
 /// M: how far a change of a free limb's joints moves what its objectives control.

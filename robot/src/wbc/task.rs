@@ -1,6 +1,6 @@
-//! An objective, a contact or a stop as three rows: J, its errors, and the acceleration that it asks for.
+//! An objective or a contact as three rows: J, its errors, and the acceleration that it asks for.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use super::{Gains, hierarchy::Rows};
 use crate::{
@@ -34,11 +34,22 @@ impl Task {
         }
     }
 
-    /// A quantity that is held to what is permitted to it: one row; the other two are empty.
-    pub(super) fn held(row: [f64; DOF], step: f64, velocity: f64, acceleration: f64) -> Self {
-        let along = |value: f64| Vector3::new(value, 0.0, 0.0);
-        let rows = [row, [0.0; DOF], [0.0; DOF]];
-        Self { rows, error: along(step), velocity: along(velocity), acceleration: along(acceleration) }
+    /// The torso's step, velocity and acceleration in its own frame, linear and angular.
+    pub(super) fn torso([step, velocity, acceleration]: &[Vector6<f64>; 3]) -> [Self; 2] {
+        [0, 3].map(|first| {
+            let of = |motion: &Vector6<f64>| motion.fixed_rows::<3>(first).into_owned();
+            let mut rows = [[0.0; DOF]; 3];
+            for (axis, row) in rows.iter_mut().enumerate() {
+                row[first + axis] = 1.0;
+            }
+            Self { rows, error: of(step), velocity: of(velocity), acceleration: of(acceleration) }
+        })
+    }
+
+    /// The same rows without any demand.
+    pub(super) fn unmoved(self) -> Self {
+        let none = Vector3::zeros();
+        Self { error: none, velocity: none, acceleration: none, ..self }
     }
 
     /// Whether every number but the rows is finite; those of the state are checked before.
@@ -69,10 +80,10 @@ pub(super) fn rows(frame: &FrameMotion, first: usize) -> Rows {
     std::array::from_fn(|row| std::array::from_fn(|column| frame.jacobian[(first + row, column)]))
 }
 
-pub(super) fn linear(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
+pub(super) fn linear(twist: &Vector6<f64>) -> Vector3<f64> {
     twist.fixed_rows::<3>(0).into_owned()
 }
 
-pub(super) fn angular(twist: &nalgebra::Vector6<f64>) -> Vector3<f64> {
+pub(super) fn angular(twist: &Vector6<f64>) -> Vector3<f64> {
     twist.fixed_rows::<3>(3).into_owned()
 }

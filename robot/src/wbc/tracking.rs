@@ -2,15 +2,11 @@
 
 use nalgebra::Matrix3;
 
-use super::{
-    hierarchy::{Mark, TaskChain},
-    inertia::InertiaFactor,
-    task::Task,
-};
+use super::{hierarchy::TaskChain, inertia::InertiaFactor, task::Task};
 use crate::dynamics::{MassMatrix, Motion};
 
-/// Levels that fit without taking memory: four feet, all stops and all objectives.
-const LEVELS: usize = 64;
+/// Levels that fit without taking memory: four feet, the torso and all objectives.
+const LEVELS: usize = 32;
 
 /// The two chains of tasks.
 pub(super) struct Tracking {
@@ -28,13 +24,6 @@ struct Level {
     damping: Option<Matrix3<f64>>,
 }
 
-/// After some of the tasks.
-#[derive(Clone, Copy)]
-pub(super) struct TrackingMark {
-    kinematic: Mark,
-    levels: usize,
-}
-
 impl Tracking {
     pub(super) fn new() -> Self {
         Self {
@@ -48,8 +37,18 @@ impl Tracking {
     /// Begins a step: q̄_0 = q, dq̄_0 = 0, ddq̄_0 = 0.
     pub(super) fn begin(&mut self, mass_matrix: &MassMatrix) {
         self.factor.factor(mass_matrix);
+        self.restart();
+    }
+
+    /// Begins again in the same state.
+    pub(super) fn restart(&mut self) {
         self.kinematic.clear();
         self.levels.clear();
+    }
+
+    /// How many levels there are.
+    pub(super) const fn levels(&self) -> usize {
+        self.levels.len()
     }
 
     /// One level of the hierarchy: the paper's first two recursions, with J_pre of the exact null space.
@@ -66,19 +65,19 @@ impl Tracking {
         self.levels.push(Level { task, damping });
     }
 
-    /// ddq̄ = L⁻¹ y, after the levels up to a mark and after all: the third recursion.
+    /// ddq̄ = L⁻¹ y, after the first levels and after all: the third recursion.
     ///
     /// ```text
     /// ddq̄_i = ddq̄_{i-1} + J_pre‡  D (ẍ_cmd - J̇ q̇ - J ddq̄_{i-1})
     /// ```
     /// D is the kinematic chain's: J_pre loses rank in the same configurations in either metric. Nothing of q̄
     /// and dq̄ depends on ddq̄, so that it is computed once, when they are settled.
-    pub(super) fn accelerations(&mut self, mark: TrackingMark) -> [Motion; 2] {
+    pub(super) fn accelerations(&mut self, first: usize) -> [Motion; 2] {
         self.dynamic.clear();
-        let mut at_mark = Motion::zeros();
+        let mut after_first = Motion::zeros();
         for (index, Level { task, damping }) in self.levels.iter().enumerate() {
-            if index == mark.levels {
-                at_mark = self.acceleration();
+            if index == first {
+                after_first = self.acceleration();
             }
             let mut weighed = task.rows;
             self.factor.weigh(&mut weighed);
@@ -86,18 +85,7 @@ impl Tracking {
             self.dynamic.track(&projected, damping.as_ref(), &[task.acceleration]);
         }
         let after_all = self.acceleration();
-        [if mark.levels < self.levels.len() { at_mark } else { after_all }, after_all]
-    }
-
-    /// To come back to with [`Self::rewind`].
-    pub(super) fn mark(&self) -> TrackingMark {
-        TrackingMark { kinematic: self.kinematic.mark(), levels: self.levels.len() }
-    }
-
-    /// Forgets the tasks since a mark.
-    pub(super) fn rewind(&mut self, mark: TrackingMark) {
-        self.kinematic.rewind(mark.kinematic);
-        self.levels.truncate(mark.levels);
+        [if first < self.levels.len() { after_first } else { after_all }, after_all]
     }
 
     /// q̄ - q

@@ -236,3 +236,49 @@ fn a_limb_that_is_called_beyond_its_length_stretches_and_comes_back() {
         assert!(back.translation.vector.norm() < 1e-4 && back.rotation.angle() < 1e-3, "{far}: {back}");
     }
 }
+
+/// Called higher, aside or askew than the standing legs can take it, the torso goes as far as they can.
+#[test]
+fn a_torso_that_is_called_beyond_its_legs_stops_where_they_end_and_comes_back() {
+    let calls = [
+        ([0.0, 0.0, 0.25], [0.0; 3]),
+        ([0.25, 0.1, 0.05], [0.0; 3]),
+        ([0.0, -0.2, -0.1], [0.0, 0.0, 0.4]),
+        ([0.0; 3], [0.9, 0.0, 0.0]),
+        ([0.0; 3], [-0.5, 0.8, 0.6]),
+    ];
+    for (far, turn) in calls {
+        let mut plant = Plant::new(model(), ready());
+        let (gripper, start) = (plant.gripper(), plant.torso);
+        let goal = Isometry3::from_parts(
+            (start.translation.vector + Vector3::from(far)).into(),
+            UnitQuaternion::from_scaled_axis(turn.into()) * start.rotation,
+        );
+        let mut stopped = 0;
+        let mut lead = |plant: &mut Plant, from: &Isometry3<f64>, to: &Isometry3<f64>, seconds: f64| {
+            let ticks = (seconds / DT_S) as i32;
+            for tick in 1..=ticks {
+                let share = f64::from(tick) / f64::from(ticks);
+                plant.torso = from.lerp_slerp(to, share * share * (3.0 - 2.0 * share));
+                plant.tick(&gripper, Vector3::zeros());
+                // Of the legs that stand.
+                stopped |= plant.sut.stops.joints() & 0xff8;
+            }
+        };
+        lead(&mut plant, &start, &goal, 2.0);
+        lead(&mut plant, &goal, &goal, 1.5);
+        let still = plant.state.velocity.amax();
+        lead(&mut plant, &goal, &start, 2.0);
+        lead(&mut plant, &start, &start, 1.0);
+        let back = plant.state.world_from_torso.inverse() * start;
+        let name = format!("{far:?} {turn:?}");
+        assert!(
+            stopped != 0 && plant.beyond < 0.0 && plant.speed < 1.01,
+            "{name}: {} {}",
+            plant.beyond,
+            plant.speed
+        );
+        assert!(plant.jump < 15.0 && still < 0.05, "{name}: {} {still}", plant.jump);
+        assert!(back.translation.vector.norm() < 1e-4 && back.rotation.angle() < 1e-3, "{name}: {back}");
+    }
+}
