@@ -1,9 +1,9 @@
 //! From what the operator wants to what each body should do now.
 //!
 //! ```text
-//! Command ──► Engagement ──► DrivenBody: anchor ──► Ramp ──► Limits, Reach ──► PoseFollower ──► PoseReference
-//!             who moves it                        within range and reach,  within speed     pose, velocity,
-//!                                                 over the feet            and acceleration acceleration
+//! Command ──► Engagement ──► anchor, Ramp ──► PoseFollower ──► Limits, Reach ───► PoseFollower ──► PoseReference
+//!             who moves it   DrivenBody       at the body's    range, reach,      the same way     pose, velocity,
+//!                                             own pace         over the feet      or along limits  acceleration
 //! ```
 
 mod body;
