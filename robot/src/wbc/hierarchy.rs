@@ -22,8 +22,12 @@ use crate::dynamics::DOF;
 /// Three rows of a Jacobian; rows that are zero come last.
 pub(super) type Rows = [[f64; DOF]; 3];
 
-/// Directions whose singular value is below this share of the task's Jacobian are none.
+/// Directions whose singular value is below this share of the task's Jacobian are not followed; but they are used up,
+/// so that no lower task moves along them what this one controls.
 const RANK_TOLERANCE: f64 = 1e-7;
+
+/// What is below this share is rounding, and no direction.
+const ROUNDING: f64 = 1e-11;
 
 /// Below this share a task's triangular factor is not inverted: its singular values are looked at.
 const REGULAR: f64 = 1e-4;
@@ -94,7 +98,7 @@ impl<const N: usize> TaskChain<N> {
         if regular && least_singular_value_exceeds(&lower, count, start.max(REGULAR * size)) {
             return Projected { count, inverse: inverse_of(&lower, count), damping: None };
         }
-        self.fade(&lower, start, RANK_TOLERANCE * size)
+        self.fade(&lower, start, size)
     }
 
     /// Splits rows into what the chain has used (J Q, kept in `seen`) and what is left, L V with orthonormal
@@ -129,7 +133,7 @@ impl<const N: usize> TaskChain<N> {
                 }
             }
             // What is left of a row that depends on others is rounding.
-            let something = length > 1e-2 * RANK_TOLERANCE * sizes[row].sqrt();
+            let something = length > ROUNDING * sizes[row].sqrt();
             lower[(row, row)] = if something { length } else { 0.0 };
             let scale = if something { 1.0 / length } else { 0.0 };
             rest[0] = direction.map(|entry| entry * scale);
@@ -141,26 +145,35 @@ impl<const N: usize> TaskChain<N> {
     /// followed when σ is at least `start`, and (σ / start)² below.
     ///
     /// It makes of 1/σ the damped σ / (σ² + λ²) with λ² = start² - σ²: exact away from singularities,
-    /// continuous into them, and never above 1 / start. Directions with σ up to `nothing` are dropped.
-    fn fade(&mut self, lower: &Matrix3<f64>, start: f64, nothing: f64) -> Projected {
-        let (left, squares) = eigen(lower * lower.transpose());
+    /// continuous into them, and never above 1 / start. `size` is that of the task's Jacobian.
+    fn fade(&mut self, lower: &Matrix3<f64>, start: f64, size: f64) -> Projected {
+        let (left, _) = eigen(lower * lower.transpose());
         let mut projected = Projected { count: 0, inverse: Matrix3::zeros(), damping: None };
         let mut kept = [0.0; 3];
         let mut turn = Matrix3::zeros();
         for index in 0..3 {
-            let singular = squares[index].max(0.0).sqrt();
+            let image = left.column(index).transpose() * lower;
+            // The eigenvalue's root would be off by 1e-8.
+            let singular = image.norm();
             kept[index] = if singular >= start { 1.0 } else { (singular / start).powi(2) };
             // The last condition keeps rounding from offering more directions than there are.
-            if singular <= nothing || self.rank + projected.count >= DOF {
+            if singular <= ROUNDING * size || self.rank + projected.count >= DOF {
                 continue;
             }
-            let mut row = left.column(index).transpose() * lower / singular;
+            let mut row = image / singular;
             for sibling in 0..projected.count {
                 let along = turn.row(sibling).dot(&row);
                 row -= turn.row(sibling) * along;
             }
-            turn.set_row(projected.count, &(row / row.norm()));
-            projected.inverse.set_row(projected.count, &(left.column(index).transpose() / singular));
+            let length = row.norm();
+            // Of two that are nearly nothing, the second may be the first again.
+            if length < CANCELLED {
+                continue;
+            }
+            turn.set_row(projected.count, &(row / length));
+            if singular > RANK_TOLERANCE * size {
+                projected.inverse.set_row(projected.count, &(left.column(index).transpose() / singular));
+            }
             projected.count += 1;
         }
         if start > 0.0 {
