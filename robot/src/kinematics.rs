@@ -121,6 +121,32 @@ impl FootKinematics {
     }
 }
 
+/// J⁻¹ of a leg's joints, damped: Jᵀ (J Jᵀ + λ²)⁻¹ with λ = 1 mm/rad. A leg whose least singular value is 20 times as
+/// long, nearly stretched, is still inverted to a quarter of a percent.
+pub fn inverse_of_leg(linear: &Matrix3<f64>) -> Matrix3<f64> {
+    const DAMPING: f64 = 1e-3;
+    let square = linear * linear.transpose() + Matrix3::identity() * DAMPING.powi(2);
+    linear.tr_mul(&square.try_inverse().unwrap_or_default())
+}
+
+/// How far a point of a joint's body, in the torso's frame, moves along a direction for each joint's angle, m/rad:
+/// n · (a_j × (p - o_j)) for the joints between it and the torso. Of the torso's own points, nothing moves.
+pub fn slope_of_point(
+    bodies: &impl Bodies,
+    joint: Option<usize>,
+    point: &Vector3<f64>,
+    direction: &Vector3<f64>,
+) -> JointVector {
+    let mut slope = JointVector::zeros();
+    let mut above = joint;
+    while let Some(joint) = above {
+        let (_, origin) = bodies.pose(joint);
+        slope[joint] = direction.dot(&bodies.axis(joint).cross(&(point - origin)));
+        above = PARENT[joint];
+    }
+    slope
+}
+
 /// Joint angles that bring a foot to a point in the torso's frame, or as near as the joints' ranges allow.
 ///
 /// Damped Gauss-Newton steps from `start`, within the model's ranges; for the set-up of motions, not for the

@@ -1,11 +1,11 @@
-//! The nearest point of a polyhedron: how a limb's motion is brought inside its limits, by the whole-body
-//! controller and by the commander.
+//! The nearest point of a polyhedron: how the motion of a limb or of the torso is brought inside its limits, by the
+//! whole-body controller and by the commander.
 //!
 //! ```text
-//! minimize   ½ dᵀ M d + ½/ρ Σ s_i²      over d in R⁶, s
+//! minimize   ½ (d - w)ᵀ M (d - w) + ½/ρ Σ s_i²      over d in R⁶, s
 //! subject to a_i · d + s_i ≥ b_i
 //! ```
-//! With M = L Lᵀ and z = Lᵀ d this is a least-norm problem, solved by the dual active-set method of Goldfarb and
+//! With M = L Lᵀ and z = Lᵀ (d - w) this is a least-norm problem, solved by the dual active-set method of Goldfarb and
 //! Idnani ("A numerically stable dual method for solving strictly convex quadratic programs", Mathematical
 //! Programming 27, 1983). A projection onto a convex set: the result is unique and moves no more than what is
 //! projected does, so that limits which begin or cease to act cause no jump. The slack s, with its small ρ, makes
@@ -20,7 +20,7 @@ const SHORTEST: f64 = 1e-6;
 /// Excess that is none, as a share of a row's length in z.
 const TOLERANCE: f64 = 1e-9;
 
-/// Constraints a_i · d ≥ b_i on a limb's motion.
+/// Constraints a_i · d ≥ b_i on a motion.
 #[derive(Debug, Clone)]
 pub(crate) struct Polyhedron {
     rows: [Vector6<f64>; Self::MOST],
@@ -49,16 +49,20 @@ impl Polyhedron {
         }
     }
 
-    /// Whether d = 0 satisfies all.
-    pub(crate) fn contains_zero(&self) -> bool {
-        self.bounds[..self.count].iter().all(|bound| *bound <= 1e-12)
+    /// Whether a motion satisfies all.
+    pub(crate) fn contains(&self, motion: &Vector6<f64>) -> bool {
+        let constraints = self.rows.iter().zip(&self.bounds).take(self.count);
+        constraints.into_iter().all(|(row, bound)| row.dot(motion) >= bound - 1e-12)
     }
 
-    /// The d nearest to 0 in the metric M; nothing if M is not positive definite.
-    pub(crate) fn nearest(&self, metric: &Matrix6<f64>) -> Option<Vector6<f64>> {
+    /// The motion nearest to a wanted one, w, in the metric M; nothing if M is not positive definite.
+    pub(crate) fn nearest(&self, wanted: &Vector6<f64>, metric: &Matrix6<f64>) -> Option<Vector6<f64>> {
+        if self.contains(wanted) {
+            return Some(*wanted);
+        }
         let lower = metric.cholesky()?.unpack();
         let mut rows = [Vector6::zeros(); Self::MOST];
-        let mut bounds = self.bounds;
+        let mut bounds = [f64::NEG_INFINITY; Self::MOST];
         for (index, row) in self.rows[..self.count].iter().enumerate() {
             let mut z = *row;
             // L z = a; then of length 1.
@@ -66,14 +70,13 @@ impl Polyhedron {
             let length = z.norm();
             if length > SHORTEST {
                 rows[index] = z / length;
-                bounds[index] /= length;
-            } else {
-                bounds[index] = f64::NEG_INFINITY;
+                bounds[index] = (self.bounds[index] - row.dot(wanted)) / length;
             }
         }
         let mut z = least_norm(&rows[..self.count], &bounds[..self.count]);
         lower.tr_solve_lower_triangular_mut(&mut z);
-        z.iter().all(|entry| entry.is_finite()).then_some(z)
+        let nearest = wanted + z;
+        nearest.iter().all(|entry| entry.is_finite()).then_some(nearest)
     }
 }
 
@@ -201,7 +204,7 @@ mod tests {
             rows in prop::collection::vec((vector(), -0.5..0.3f64), 1..9), metric in metric(),
         ) {
             let sut = polyhedron(&rows);
-            let d = sut.nearest(&metric).unwrap();
+            let d = sut.nearest(&Vector6::zeros(), &metric).unwrap();
             // Feasible up to the slack, for these random rows nearly always possible.
             let excess = |(row, bound): &(Vector6<f64>, f64)| bound - row.dot(&d);
             prop_assume!(rows.iter().all(|row| excess(row) < 1e-3));
@@ -219,13 +222,24 @@ mod tests {
         }
 
         #[test]
+        fn a_wanted_motion_is_where_it_is_measured_from(
+            rows in prop::collection::vec((vector(), -0.5..0.3f64), 1..9), metric in metric(), wanted in vector(),
+        ) {
+            let shifted: Vec<_> = rows.iter().map(|(row, bound)| (*row, bound - row.dot(&wanted))).collect();
+            let there = polyhedron(&rows).nearest(&wanted, &metric).unwrap();
+            let change = polyhedron(&shifted).nearest(&Vector6::zeros(), &metric).unwrap();
+            prop_assert!((there - wanted - change).norm() < 1e-6 * (1.0 + there.norm()), "{there} {change}");
+        }
+
+        #[test]
         fn it_moves_no_more_than_the_bounds(
             rows in prop::collection::vec((vector(), -0.5..0.3f64), 1..12),
             shift in prop::collection::vec(-1e-4..1e-4f64, 12),
             metric in metric(),
         ) {
             let moved: Vec<_> = rows.iter().zip(&shift).map(|((row, bound), by)| (*row, bound + by)).collect();
-            let (a, b) = (polyhedron(&rows).nearest(&metric).unwrap(), polyhedron(&moved).nearest(&metric).unwrap());
+            let nearest = |rows: &[_]| polyhedron(rows).nearest(&Vector6::zeros(), &metric).unwrap();
+            let (a, b) = (nearest(&rows), nearest(&moved));
             prop_assume!(a.norm() < 3.0);
             prop_assert!((a - b).norm() < 0.05, "{}", (a - b).norm());
         }
@@ -234,14 +248,15 @@ mod tests {
     #[test]
     fn what_is_inside_stays() {
         let sut = polyhedron(&[(Vector6::x(), -0.1), (-Vector6::x(), -0.1)]);
-        assert!(sut.contains_zero());
-        assert_eq!(sut.nearest(&Matrix6::identity()).unwrap(), Vector6::zeros());
+        let inside = Vector6::y() * 3.0 + Vector6::x() * 0.1;
+        assert_eq!(sut.nearest(&inside, &Matrix6::identity()).unwrap(), inside);
+        assert!(sut.contains(&inside) && !sut.contains(&Vector6::x()));
     }
 
     #[test]
     fn limits_that_contradict_each_other_share_the_excess() {
         let sut = polyhedron(&[(Vector6::x(), 1.0), (-Vector6::x(), 1.0)]);
-        let d = sut.nearest(&Matrix6::identity()).unwrap();
+        let d = sut.nearest(&Vector6::zeros(), &Matrix6::identity()).unwrap();
         assert!(d.norm() < 1e-6, "{d}");
     }
 
@@ -251,7 +266,7 @@ mod tests {
         let row = Vector6::x() + Vector6::y();
         let metric = row * row.transpose() + Matrix6::identity() * 1e-4;
         // The first is to go back by 0.1.
-        let d = polyhedron(&[(-Vector6::x(), 0.1)]).nearest(&metric).unwrap();
+        let d = polyhedron(&[(-Vector6::x(), 0.1)]).nearest(&Vector6::zeros(), &metric).unwrap();
         assert!((d.x + 0.1).abs() < 1e-5 && (d.y - 0.1).abs() < 1e-3, "{d}");
     }
 }

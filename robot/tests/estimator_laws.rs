@@ -9,7 +9,7 @@ use locoman_robot::{
     estimator::{EstimatorSettings, KinematicEstimator},
     joints::{JointVector, Leg, Side},
     kinematics::FootKinematics,
-    model::{GRAVITY, Model},
+    model::{FOOT_RADIUS_M, GRAVITY, Model},
     plant::Sensors,
     wbc::ContactSet,
 };
@@ -72,7 +72,7 @@ impl Robot {
         for leg in Leg::ALL {
             position.fixed_rows_mut::<3>(leg.first_joint()).copy_from_slice(&[0.0, 0.9, -1.8]);
         }
-        let height = settings.foot_radius_m - settings.foot_sink_m_n * LOAD_N;
+        let height = FOOT_RADIUS_M - settings.foot_sink_m_n * LOAD_N;
         let feet = Leg::ALL.map(|leg| {
             let foot = FootKinematics::new(&model, &position, leg).position();
             Vector3::new(foot.x, foot.y, height)
@@ -132,10 +132,10 @@ impl Robot {
         let before = self.world_from_torso;
         self.world_from_torso = self.motion.pose(self.ticks as f64 * DT_S);
         for leg in Leg::ALL {
-            let rolling = self.settings.foot_radius_m - 0.5 * self.depth(leg);
+            let rolling = FOOT_RADIUS_M - 0.5 * self.depth(leg);
             let rotation = before.rotation * self.kinematics(leg).torso_from_foot.rotation;
             let mut place = self.feet[leg.index()] + self.slip[leg.index()] * DT_S;
-            place.z = self.settings.foot_radius_m - self.depth(leg);
+            place.z = FOOT_RADIUS_M - self.depth(leg);
             self.feet[leg.index()] = place;
             // How far it rolls depends on where it rolls to.
             for _ in 0..3 {
@@ -158,7 +158,7 @@ impl Robot {
         for leg in Leg::ALL {
             // v + R (J dq + ω × x) = R (ω + A dq) × ρ n + slip, for dq.
             let foot = self.kinematics(leg);
-            let up = (self.settings.foot_radius_m - 0.5 * self.depth(leg)) * Vector3::z();
+            let up = (FOOT_RADIUS_M - 0.5 * self.depth(leg)) * Vector3::z();
             let roll = Matrix3::from_columns(&[0, 1, 2].map(|joint| {
                 let axis = rotation * foot.angular.column(joint);
                 axis.cross(&up) - rotation * foot.linear.column(joint)

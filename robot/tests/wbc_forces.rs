@@ -125,7 +125,7 @@ fn both_solvers_agree_on_100_000_recorded_problems() {
     let mut met = Met::default();
     for index in 0..PROBLEMS {
         let case = &cases[index as usize % cases.len()];
-        let state = situations::state(&mut random, &nominal);
+        let state = situations::state(&mut random, &nominal, &case.stance);
         dynamics.update(&nominal, &state);
         let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);

@@ -170,8 +170,7 @@ fn laws_hold_in(case: &Case, seed: u64) {
     let mut dynamics = Dynamics::new();
     let mut checked = Checked::default();
     for _ in 0..STATES {
-        let mut state = situations::state(&mut random, &bench.model);
-        situations::draw_up(&mut state, &case.stance, &bench.model);
+        let state = situations::state(&mut random, &bench.model, &case.stance);
         dynamics.update(&bench.model, &state);
         let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);
@@ -346,7 +345,7 @@ fn the_command_is_continuous_where_a_target_is() {
     let (mut standing, mut limbs, mut begin_or_end) = (0, 0, 0);
     for way in 0..WAYS * cases.len() {
         let case = &cases[way % cases.len()];
-        let state = situations::state(&mut random, &bench.model);
+        let state = situations::state(&mut random, &bench.model, &case.stance);
         dynamics.update(&bench.model, &state);
         let mut objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);

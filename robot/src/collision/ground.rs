@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Vector3};
 use super::{CollisionModel, Link};
 use crate::{
     joints::{JointVector, Leg},
-    kinematics::Bodies,
-    model::PARENT,
+    kinematics::{Bodies, slope_of_point},
+    model::FOOT_RADIUS_M,
 };
 
 /// Flat, level ground, seen from the torso.
@@ -45,7 +45,7 @@ impl Ground {
         model: &'a CollisionModel,
         bodies: &'a impl Bodies,
     ) -> impl Iterator<Item = Altitude> + 'a {
-        model.shapes_of(leg).iter().flat_map(move |shape| {
+        model.shapes_of(leg).flat_map(move |shape| {
             shape.link.joint().into_iter().flat_map(move |joint| {
                 let (rotation, origin) = bodies.pose(joint);
                 [shape.capsule.a, shape.capsule.b].map(|end| {
@@ -61,13 +61,12 @@ impl Ground {
 impl Altitude {
     /// How the height grows with each joint's angle while the torso stands still, m/rad.
     pub fn gradient(&self, ground: &Ground, bodies: &impl Bodies) -> JointVector {
-        let mut gradient = JointVector::zeros();
-        let mut above = Some(self.joint);
-        while let Some(joint) = above {
-            let (_, origin) = bodies.pose(joint);
-            gradient[joint] = ground.up.dot(&bodies.axis(joint).cross(&(self.center - origin)));
-            above = PARENT[joint];
-        }
-        gradient
+        slope_of_point(bodies, Some(self.joint), &self.center, &ground.up)
     }
+}
+
+/// Mean height of the ground under feet that stand, from those of their centres, m; nothing without any.
+pub fn height_under(feet: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = feet.fold((0.0, 0.0), |(sum, count), height| (sum + height, count + 1.0));
+    (count > 0.0).then(|| sum / count - FOOT_RADIUS_M)
 }

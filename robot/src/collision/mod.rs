@@ -13,6 +13,6 @@ mod links;
 mod model;
 
 pub use capsule::{Capsule, Separation, separation};
-pub use ground::{Altitude, Ground};
+pub use ground::{Altitude, Ground, height_under};
 pub use links::{Link, Part};
 pub use model::{Clearance, Clearances, CollisionModel, MOST_NEAR, Pair, Shape};

@@ -11,8 +11,8 @@ use super::{
 };
 use crate::{
     joints::{JointVector, Leg, Side},
-    kinematics::Bodies,
-    model::{ModelError, PARENT},
+    kinematics::{Bodies, slope_of_point},
+    model::ModelError,
 };
 
 /// The most capsules that there may be.
@@ -72,7 +72,6 @@ pub struct Pair {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CollisionModel {
     shapes: Vec<Shape>,
-    shapes_of_leg: [Vec<Shape>; 4],
     pairs: Vec<Pair>,
     pairs_of_side: [Vec<Pair>; 2],
 }
@@ -119,9 +118,7 @@ impl CollisionModel {
                 |pair: &&Pair| shapes[pair.first].link.leg == leg || shapes[pair.second].link.leg == leg;
             pairs.iter().filter(moves).copied().collect()
         };
-        let shapes_of_leg =
-            Leg::ALL.map(|leg| shapes.iter().filter(|shape| shape.link.leg == Some(leg)).copied().collect());
-        Self { pairs_of_side: Side::ALL.map(of_side), shapes_of_leg, shapes, pairs }
+        Self { pairs_of_side: Side::ALL.map(of_side), shapes, pairs }
     }
 
     /// All shapes.
@@ -130,8 +127,8 @@ impl CollisionModel {
     }
 
     /// Those of a leg and its arm.
-    pub fn shapes_of(&self, leg: Leg) -> &[Shape] {
-        &self.shapes_of_leg[leg.index()]
+    pub fn shapes_of(&self, leg: Leg) -> impl Iterator<Item = &Shape> {
+        self.shapes.iter().filter(move |shape| shape.link.leg == Some(leg))
     }
 
     /// All pairs that can meet.
@@ -302,20 +299,10 @@ impl Clearances {
 }
 
 impl Clearance {
-    /// How the distance grows with each joint's angle, m/rad: n · (a_j × (p - o_j)) for the joints between the
-    /// torso and the first link, less the same for the second.
+    /// How the distance grows with each joint's angle, m/rad.
     pub fn gradient(&self, bodies: &impl Bodies) -> JointVector {
-        let mut gradient = JointVector::zeros();
-        let points = [&self.nearest.first, &self.nearest.second];
-        for ((joint, point), sign) in self.joints.iter().zip(points).zip([1.0, -1.0]) {
-            let mut above = *joint;
-            while let Some(joint) = above {
-                let (_, origin) = bodies.pose(joint);
-                let lever = bodies.axis(joint).cross(&(point - origin));
-                gradient[joint] += sign * self.nearest.direction.dot(&lever);
-                above = PARENT[joint];
-            }
-        }
-        gradient
+        let Separation { first, second, direction, .. } = &self.nearest;
+        slope_of_point(bodies, self.joints[0], first, direction)
+            - slope_of_point(bodies, self.joints[1], second, direction)
     }
 }

@@ -45,7 +45,7 @@ impl FootReach {
         let gradient = now.linear.tr_mul(&(target - now.position()));
         let hessian = now.linear.tr_mul(&now.linear) + DAMPING * Matrix3::identity();
         let first = self.leg.first_joint();
-        let ranges = [self.range.hip, self.range.thigh, self.range.calf];
+        let ranges = self.range.leg();
         let mut held = [false; 3];
         // Each round holds the joints that the last one pushed out of their range.
         for _ in 0..3 {
@@ -82,16 +82,13 @@ fn solve_free(hessian: &Matrix3<f64>, gradient: &Vector3<f64>, held: &[bool; 3])
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{commander::Limits, model::Frame};
-
-    fn model() -> Model {
-        Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-    }
+    use crate::{
+        commander::Limits,
+        model::{Frame, test_model},
+    };
 
     fn lifted() -> JointVector {
         let mut joints = JointVector::zeros();
@@ -118,7 +115,7 @@ mod tests {
         fn what_can_be_reached_is_left_alone_and_from_beyond_the_way_back_is_found(
             near in prop::array::uniform3(-0.3..0.3f64), far in prop::array::uniform3(-0.4..0.4f64),
         ) {
-            let (model, range) = (model(), Limits::default().reach);
+            let (model, range) = (test_model(), Limits::default().reach);
             let start = place(&model, &lifted());
             let mut sut = FootReach::new(Leg::FrontRight, &lifted(), range);
             let mut there = lifted();
@@ -130,7 +127,7 @@ mod tests {
             let beyond = goal + Vector3::from(far);
             let reached = walk(&mut sut, &model, &goal, &beyond);
             prop_assert!((reached - beyond).norm() <= (goal - beyond).norm() + 1e-3, "nearer than without");
-            for (joint, range) in [range.hip, range.thigh, range.calf].iter().enumerate() {
+            for (joint, range) in range.leg().iter().enumerate() {
                 prop_assert!((range.min..=range.max).contains(&sut.joints[joint]));
             }
             prop_assert!((walk(&mut sut, &model, &beyond, &start) - start).norm() < 1e-3);

@@ -114,8 +114,15 @@ pub struct ReachRange {
     pub arm_1: Range,
     /// Least distance of links, m.
     pub clearance_m: f64,
-    /// Least height above the ground of links beyond the knee, m.
+    /// Least height above the ground of a limb in the air and of the mounts of the arms, m.
     pub ground_m: f64,
+}
+
+impl ReachRange {
+    /// Of hip, thigh and calf.
+    pub const fn leg(&self) -> [Range; 3] {
+        [self.hip, self.thigh, self.calf]
+    }
 }
 
 /// Everything in `limits.toml`.

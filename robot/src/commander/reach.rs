@@ -16,7 +16,8 @@
 //! in closed form ([`branches`]). When some of them are inside all limits, and far from the present ones, until
 //! [`PATIENCE_M_S`] is used up, the limb makes a [detour](Detour) to them through the space of its joints, inside
 //! the same limits. A target that nothing meets exactly causes none, nor does one that the joints are on their
-//! way to; what a detour did not come to because the robot itself bars the way is not tried again.
+//! way to; what a detour did not come to because the robot itself bars the way is not tried again. It is the limb's own
+//! motion: it rests while no fresh command says that somebody watches, and ends when he lets go.
 
 mod branches;
 mod detour;
@@ -80,6 +81,8 @@ pub struct Reach {
     detour: Option<Detour>,
     /// Where a detour did not arrive: not tried again until a target is met.
     barred: Option<Vector6<f64>>,
+    /// Nobody says at present that the limb may move on by itself.
+    paused: bool,
 }
 
 /// A change of the six joints that limits may change.
@@ -116,6 +119,7 @@ impl Reach {
             missed_m_s: 0.0,
             detour: None,
             barred: None,
+            paused: false,
         }
     }
 
@@ -136,10 +140,10 @@ impl Reach {
         self.desired = of_limb(desired, self.side);
         self.walls.find(model, &self.joints, ground);
         if let Some(detour) = self.detour {
-            let change = detour.change(&self.limb(), dt_s);
+            let change = detour.change(&self.limb(), self.paused, dt_s);
             let wish = Wish { change, metric: Matrix6::identity(), recovery: DETOUR_RECOVERY };
             let change = self.go(model, desired, &wish, dt_s);
-            self.detour = Some(detour.after(&change, &self.limb(), dt_s));
+            self.detour = Some(detour.after(&change, &self.limb(), self.paused, dt_s));
         } else {
             for _ in 0..STEPS {
                 self.step(model, desired, torso_from_target, dt_s / STEPS as f64);
@@ -172,7 +176,13 @@ impl Reach {
         self.missed_m_s = 0.0;
     }
 
-    fn limb(&self) -> Vector6<f64> {
+    /// From here on, a detour comes to rest where it is and none begins; or it goes on.
+    pub fn pause(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// Where the six joints are to go by now, rad.
+    pub fn limb(&self) -> Vector6<f64> {
         of_limb(&self.joints, self.side)
     }
 
@@ -189,9 +199,7 @@ impl Reach {
     fn range(&self, model: &Model, column: usize) -> Range {
         let joint = self.side.limb_joints()[column];
         match column {
-            0 => self.range.hip,
-            1 => self.range.thigh,
-            2 => self.range.calf,
+            0..3 => self.range.leg()[column],
             3 => self.range.arm_1,
             _ => Range { min: model.lower[joint] + MARGIN_RAD, max: model.upper[joint] - MARGIN_RAD },
         }
@@ -206,6 +214,10 @@ impl Reach {
         target: &Isometry3<f64>,
         dt_s: f64,
     ) {
+        if self.paused {
+            self.missed_m_s = 0.0;
+            return;
+        }
         let here = self.limb();
         if let Some(mut detour) = self.detour {
             if let Some(goal) = self.solution(model, ground, target, detour.goal()) {
@@ -291,15 +303,11 @@ impl Reach {
             let most = dt_s * SPEED_RAD_S.min(SPEED_SHARE * model.max_velocity[joint]);
             let angle = self.joints[joint];
             let unit = Vector6::ith(column, 1.0);
-            self.polyhedron.push(unit, (range.min - angle).clamp(-most, recovery * most) - wanted[column]);
-            self.polyhedron.push(-unit, (angle - range.max).clamp(-most, recovery * most) + wanted[column]);
+            self.polyhedron.push(unit, (range.min - angle).clamp(-most, recovery * most));
+            self.polyhedron.push(-unit, (angle - range.max).clamp(-most, recovery * most));
         }
-        self.walls.enclose(&mut self.polyhedron, wanted, recovery * RECOVERY_M_S * dt_s);
-        let change = if self.polyhedron.contains_zero() {
-            *wanted
-        } else {
-            wanted + self.polyhedron.nearest(metric).unwrap_or(-wanted)
-        };
+        self.walls.enclose(&mut self.polyhedron, recovery * RECOVERY_M_S * dt_s);
+        let change = self.polyhedron.nearest(wanted, metric).unwrap_or_default();
         self.place(&(self.limb() + change));
         self.walls.pass(&change);
         change

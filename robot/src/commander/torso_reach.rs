@@ -11,7 +11,7 @@
 //! can, and slides along what limits it. A leg at the end of its range would hold up the torso for good, and with
 //! it everything that keeps the balance.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use super::{
     limits::ReachRange,
@@ -20,7 +20,7 @@ use super::{
 use crate::{
     collision::{Ground, Part},
     joints::{JointVector, Leg},
-    kinematics::{FootKinematics, body_poses},
+    kinematics::{FootKinematics, body_poses, inverse_of_leg},
     model::Model,
     polyhedron::Polyhedron,
 };
@@ -32,8 +32,6 @@ const SPEED_M_S: f64 = 1.0;
 const SPEED_RAD_S: f64 = 3.0;
 /// Steps in each control period.
 const STEPS: usize = 2;
-/// Damping of J⁻¹, m/rad: a leg of 0.213 m links has less only within 0.1 of a straight knee.
-const DAMPING: f64 = 0.01;
 
 /// What the torso stands on.
 #[derive(Debug, Clone, Copy)]
@@ -81,22 +79,71 @@ impl TorsoReach {
     fn step(&mut self, model: &Model, footing: &Footing<'_>, target: &Isometry3<f64>, dt_s: f64) {
         let way = target.translation.vector - self.torso.translation.vector;
         let turn = (target.rotation * self.torso.rotation.inverse()).scaled_axis();
-        let mut wanted = Vector6::zeros();
         let within = |step: Vector6<f64>| {
             let way = step.fixed_rows::<3>(0).norm() / SPEED_M_S;
             let turn = step.fixed_rows::<3>(3).norm() / SPEED_RAD_S;
             step * (dt_s / way.max(turn).max(dt_s))
         };
-        wanted.fixed_rows_mut::<3>(0).copy_from(&way);
-        wanted.fixed_rows_mut::<3>(3).copy_from(&turn);
-        let wanted = within(wanted);
+        let wanted = within(Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z));
+        self.enclose(model, footing);
+        let mut metric = Matrix6::identity();
+        metric.fixed_view_mut::<3, 3>(3, 3).scale_mut(METRES_PER_RADIAN.powi(2));
+        let step = within(self.polyhedron.nearest(&wanted, &metric).unwrap_or_default());
+        self.torso.translation.vector += step.fixed_rows::<3>(0);
+        let turn = step.fixed_rows::<3>(3).into_owned();
+        self.torso.rotation = UnitQuaternion::from_scaled_axis(turn) * self.torso.rotation;
+        self.torso.rotation.renormalize();
+    }
+
+    /// Makes the polyhedron of all steps that the limits permit.
+    fn enclose(&mut self, model: &Model, footing: &Footing<'_>) {
         self.polyhedron.clear();
-        self.keep_over_the_feet(footing, &wanted);
+        self.keep_over_the_feet(footing);
         let mut of_joints = [[Vector6::zeros(); 3]; 4];
         for (of_joints, (leg, foot)) in of_joints.iter_mut().zip(footing.feet) {
             *of_joints = self.follow(model, *leg, foot);
-            self.keep_in_range(*leg, &footing.range, of_joints, &wanted);
+            self.keep_in_range(*leg, &footing.range, of_joints);
         }
+        self.keep_mounts_up(model, footing, &of_joints);
+    }
+
+    fn keep_over_the_feet(&mut self, footing: &Footing<'_>) {
+        let (mut feet, count) = ([Vector2::zeros(); 4], footing.feet.len().min(4));
+        for (place, (_, foot)) in feet.iter_mut().zip(footing.feet) {
+            *place = from_above(foot);
+        }
+        let com = from_above(&self.torso.translation.vector) + footing.com_from_torso;
+        for (corner, inwards) in edges(&feet[..count]) {
+            let row = Vector6::new(inwards.x, inwards.y, 0.0, 0.0, 0.0, 0.0);
+            self.polyhedron.push(row, footing.margin_m - inwards.dot(&(com - corner)));
+        }
+    }
+
+    /// Brings a leg to its foot. How its joints then turn with the torso.
+    fn follow(&mut self, model: &Model, leg: Leg, foot: &Vector3<f64>) -> [Vector6<f64>; 3] {
+        let kinematics = FootKinematics::new(model, &self.joints, leg);
+        let inverse = inverse_of_leg(&kinematics.linear);
+        let lacking = self.torso.inverse_transform_point(&(*foot).into()).coords - kinematics.position();
+        let mut joints = self.joints.fixed_rows_mut::<3>(leg.first_joint());
+        joints += inverse * lacking;
+        let by_foot = inverse * self.torso.rotation.to_rotation_matrix().matrix().transpose();
+        let lever = foot - self.torso.translation.vector;
+        std::array::from_fn(|joint| {
+            let along = by_foot.row(joint).transpose();
+            let turning = along.cross(&lever);
+            Vector6::new(-along.x, -along.y, -along.z, turning.x, turning.y, turning.z)
+        })
+    }
+
+    fn keep_in_range(&mut self, leg: Leg, range: &ReachRange, of_joints: &[Vector6<f64>; 3]) {
+        for ((joint, row), range) in (leg.first_joint()..).zip(of_joints).zip(range.leg()) {
+            let angle = self.joints[joint];
+            self.polyhedron.push(*row, range.min - angle);
+            self.polyhedron.push(-row, angle - range.max);
+        }
+    }
+
+    fn keep_mounts_up(&mut self, model: &Model, footing: &Footing<'_>, of_joints: &[[Vector6<f64>; 3]; 4]) {
         let ground = Ground::at(footing.ground_m, &self.torso);
         let bodies = body_poses(model, &self.joints);
         for (of_joints, (leg, _)) in of_joints.iter().zip(footing.feet) {
@@ -108,72 +155,9 @@ impl TorsoReach {
                 for (joint, of_joint) in (leg.first_joint()..).zip(of_joints) {
                     row += of_joint * gradient[joint];
                 }
-                self.keep(&row, end.height - footing.range.ground_m, &wanted);
+                self.polyhedron.push(row, footing.range.ground_m - end.height);
             }
         }
-        let mut step = wanted;
-        if !self.polyhedron.contains_zero() {
-            let mut metric = Matrix6::identity();
-            metric.fixed_view_mut::<3, 3>(3, 3).scale_mut(METRES_PER_RADIAN.powi(2));
-            step += self.polyhedron.nearest(&metric).unwrap_or(-wanted);
-        }
-        let step = within(step);
-        self.torso.translation.vector += step.fixed_rows::<3>(0);
-        let turn = step.fixed_rows::<3>(3).into_owned();
-        self.torso.rotation = UnitQuaternion::from_scaled_axis(turn) * self.torso.rotation;
-        self.torso.rotation.renormalize();
-    }
-
-    fn keep_over_the_feet(&mut self, footing: &Footing<'_>, wanted: &Vector6<f64>) {
-        let (mut feet, count) = ([Vector2::zeros(); 4], footing.feet.len().min(4));
-        for (place, (_, foot)) in feet.iter_mut().zip(footing.feet) {
-            *place = from_above(foot);
-        }
-        let com = from_above(&self.torso.translation.vector) + footing.com_from_torso;
-        for (corner, inwards) in edges(&feet[..count]) {
-            let row = Vector6::new(inwards.x, inwards.y, 0.0, 0.0, 0.0, 0.0);
-            self.keep(&row, inwards.dot(&(com - corner)) - footing.margin_m, wanted);
-        }
-    }
-
-    /// Brings a leg to its foot. How its joints then turn with the torso.
-    fn follow(&mut self, model: &Model, leg: Leg, foot: &Vector3<f64>) -> [Vector6<f64>; 3] {
-        let kinematics = FootKinematics::new(model, &self.joints, leg);
-        let square = kinematics.linear.tr_mul(&kinematics.linear) + Matrix3::identity() * DAMPING.powi(2);
-        let inverse = square.try_inverse().unwrap_or_default() * kinematics.linear.transpose();
-        let first = leg.first_joint();
-        let lacking = self.torso.inverse_transform_point(&(*foot).into()).coords - kinematics.position();
-        let change = inverse * lacking;
-        for joint in 0..3 {
-            self.joints[first + joint] += change[joint];
-        }
-        let by_foot = inverse * self.torso.rotation.to_rotation_matrix().matrix().transpose();
-        let lever = foot - self.torso.translation.vector;
-        std::array::from_fn(|joint| {
-            let along = by_foot.row(joint).transpose();
-            let turning = along.cross(&lever);
-            Vector6::new(-along.x, -along.y, -along.z, turning.x, turning.y, turning.z)
-        })
-    }
-
-    fn keep_in_range(
-        &mut self,
-        leg: Leg,
-        range: &ReachRange,
-        of_joints: &[Vector6<f64>; 3],
-        wanted: &Vector6<f64>,
-    ) {
-        let ranges = [range.hip, range.thigh, range.calf];
-        for ((joint, row), range) in (leg.first_joint()..).zip(of_joints).zip(ranges) {
-            let angle = self.joints[joint];
-            self.keep(row, angle - range.min, wanted);
-            self.keep(&-row, range.max - angle, wanted);
-        }
-    }
-
-    /// What is left of a limit may be used up.
-    fn keep(&mut self, row: &Vector6<f64>, room: f64, wanted: &Vector6<f64>) {
-        self.polyhedron.push(*row, -room - row.dot(wanted));
     }
 }
 

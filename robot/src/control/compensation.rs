@@ -166,16 +166,11 @@ impl Compensation {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::model::test_model;
 
     const DT_S: f64 = 0.0025;
     const CALF: usize = 2;
-
-    fn model() -> Model {
-        Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-    }
 
     fn command(velocity: f64) -> JointCommand {
         let mut command = JointCommand::damping();
@@ -188,7 +183,7 @@ mod tests {
     /// until the wish exceeds the friction, and then keeps so far behind. Returns the last error.
     fn drag(sut: &mut Compensation, friction_nm: f64, seconds: f64) -> f64 {
         const KP: f64 = 60.0;
-        let (model, air) = (model(), ContactSet::STANCE.with_share(Leg::FrontRight, 0.0));
+        let (model, air) = (test_model(), ContactSet::STANCE.with_share(Leg::FrontRight, 0.0));
         let (mut angle, mut error) = (-1.5, 0.0_f64);
         for tick in 0..(seconds / DT_S) as usize {
             let t = tick as f64 * DT_S;
@@ -217,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_lasting_error_is_taken_away_within_bounds() {
-        let (model, mut sut) = (model(), Compensation::new(CompensationSettings::default()));
+        let (model, mut sut) = (test_model(), Compensation::new(CompensationSettings::default()));
         let step = JointVector::from_element(0.01);
         let mut last = command(0.0);
         for _ in 0..40_000 {
@@ -233,7 +228,7 @@ mod tests {
 
     #[test]
     fn a_foot_in_the_air_has_no_offset_of_its_load() {
-        let (model, mut sut) = (model(), Compensation::new(CompensationSettings::default()));
+        let (model, mut sut) = (test_model(), Compensation::new(CompensationSettings::default()));
         let mut contacts = ContactSet::STANCE;
         for _ in 0..400 {
             sut.apply(&model, &JointVector::from_element(0.01), &contacts, DT_S, &mut command(0.0));

@@ -255,8 +255,7 @@ impl Dynamics {
 
         let speed = velocity.at(&point);
         stack(&mut target.velocity, world_from_torso, &speed, &velocity.angular);
-        // The spatial acceleration at the point lacks the turning of the point's velocity, ω × ṗ.
-        let acceleration = bias.at(&point) + velocity.angular.cross(&speed);
+        let acceleration = bias.of_point(&point, &velocity);
         stack(&mut target.bias_acceleration, world_from_torso, &acceleration, &bias.angular);
     }
 
@@ -268,8 +267,7 @@ impl Dynamics {
     /// Acceleration of a point of a joint's body when dv/dt = 0; the point and it along the torso's axes, m/s².
     pub fn bias_acceleration_at(&self, joint: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let link = &self.links[joint];
-        // The spatial acceleration at the point lacks the turning of the point's velocity, ω × ṗ.
-        link.bias_acceleration.at(point) + link.velocity.angular.cross(&link.velocity.at(point))
+        link.bias_acceleration.of_point(point, &link.velocity)
     }
 
     /// A(q), with the rotors' reflected inertia on its diagonal.

@@ -44,6 +44,12 @@ impl Spatial {
         }
     }
 
+    /// Acceleration of the body's point at `point`, of a spatial acceleration: that lacks the turning of the point's
+    /// velocity, ω × ṗ.
+    pub(super) fn of_point(&self, point: &Vector3<f64>, velocity: &Self) -> Vector3<f64> {
+        self.at(point) + velocity.angular.cross(&velocity.at(point))
+    }
+
     /// Velocity of the body's point at `point`.
     pub(super) fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.linear + self.angular.cross(point)

@@ -8,7 +8,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{EstimatorSettings, low_pass};
-use crate::kinematics::FootKinematics;
+use crate::{kinematics::FootKinematics, model::FOOT_RADIUS_M};
 
 /// Time constant with which the velocity of a contact point is averaged, s: less noise, and a slip of twice the
 /// threshold is found in as long.
@@ -77,7 +77,7 @@ impl StandingFoot {
 
     /// From the contact point to the centre, along which the foot rolls.
     pub(super) fn rolling_radius(&self, settings: &EstimatorSettings) -> Vector3<f64> {
-        (settings.foot_radius_m - 0.5 * self.depth_m(settings)) * Vector3::z()
+        (FOOT_RADIUS_M - 0.5 * self.depth_m(settings)) * Vector3::z()
     }
 
     /// Sets the anchor to where the estimate sees the foot.

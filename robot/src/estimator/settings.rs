@@ -6,8 +6,6 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorSettings {
-    /// Radius of the foot's sphere, m.
-    pub foot_radius_m: f64,
     /// A foot sinks in by so much for each newton, m/N.
     pub foot_sink_m_n: f64,
     /// Force from which a foot is trusted fully, N.
@@ -41,7 +39,6 @@ pub struct EstimatorSettings {
 impl Default for EstimatorSettings {
     fn default() -> Self {
         Self {
-            foot_radius_m: 0.02,
             foot_sink_m_n: 1.75e-5,
             full_trust_n: 15.0,
             imu_tilt_s: 0.1,

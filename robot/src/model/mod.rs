@@ -97,3 +97,9 @@ impl Model {
         &self.hand_from_gripper[side.index()]
     }
 }
+
+/// The robot of this repository, for unit tests.
+#[cfg(test)]
+pub(crate) fn test_model() -> Model {
+    Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
+}

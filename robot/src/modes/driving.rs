@@ -9,7 +9,7 @@ use crate::{
         Command, DrivenBody, FootReach, Footing, Grip, Limits, PoseReference, RateLimits, Reach, SampleClock,
         TorsoReach, from_above, rebased_point,
     },
-    joints::{JointVector, Leg, Side},
+    joints::{JointVector, Side},
     kinematics::torso_from_frame,
     model::{FOOT_RADIUS_M, Frame},
     trajectory::{Player, Sample},
@@ -139,6 +139,7 @@ impl Driving {
 
     fn listen(&mut self, operator: &Operator<'_>, scene: &Scene<'_>) {
         let Some((command, grip)) = operator.command else { return self.release() };
+        self.gripper_reach.pause(grip == Grip::Frozen);
         if let Some(player) = &mut self.player {
             player.advance(grip == Grip::Holds, scene.dt_s);
         }
@@ -190,12 +191,7 @@ impl Driving {
             .com_from_torso
             .map_or(measured, |com| com + (measured - com) * (scene.dt_s * COM_CUTOFF_RAD_S).min(1.0));
         self.com_from_torso = Some(com_from_torso);
-        let mut feet = [(Leg::FrontRight, Vector3::zeros()); 4];
-        let mut count = 0;
-        for (place, leg) in feet.iter_mut().zip(setpoint.contacts.legs()) {
-            *place = (leg, scene.foot(leg));
-            count += 1;
-        }
+        let (feet, count) = scene.footholds(&setpoint.contacts);
         let footing = Footing {
             feet: &feet[..count],
             com_from_torso,

@@ -3,11 +3,12 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 use crate::{
+    collision::height_under,
     commander::from_above,
     dynamics::State,
     joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
-    model::{FOOT_RADIUS_M, Frame, Model},
+    model::{Frame, Model},
     wbc::ContactSet,
 };
 
@@ -61,23 +62,24 @@ impl Scene<'_> {
         Isometry3::from_parts((middle + Vector3::z() * height_m).into(), yaw)
     }
 
-    /// The feet that stand, seen from above, and how many they are.
-    pub fn standing_feet(&self, contacts: &ContactSet) -> ([Vector2<f64>; 4], usize) {
-        let (mut feet, mut count) = ([Vector2::zeros(); 4], 0);
-        for leg in contacts.legs() {
-            feet[count] = from_above(&self.foot(leg));
+    /// The legs that stand, with the centres of their feet, and how many they are.
+    pub fn footholds(&self, contacts: &ContactSet) -> ([(Leg, Vector3<f64>); 4], usize) {
+        let (mut footholds, mut count) = ([(Leg::FrontRight, Vector3::zeros()); 4], 0);
+        for (place, leg) in footholds.iter_mut().zip(contacts.legs()) {
+            *place = (leg, self.foot(leg));
             count += 1;
         }
-        (feet, count)
+        (footholds, count)
+    }
+
+    /// The feet that stand, seen from above, and how many they are.
+    pub fn standing_feet(&self, contacts: &ContactSet) -> ([Vector2<f64>; 4], usize) {
+        let (footholds, count) = self.footholds(contacts);
+        (footholds.map(|(_, foot)| from_above(&foot)), count)
     }
 
     /// Height of the ground under the feet that stand, in their mean; without any there is no ground.
     pub fn ground(&self, contacts: &ContactSet) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for leg in contacts.legs() {
-            sum += self.foot(leg).z;
-            count += 1.0;
-        }
-        if count == 0.0 { f64::NEG_INFINITY } else { sum / count - FOOT_RADIUS_M }
+        height_under(contacts.legs().map(|leg| self.foot(leg).z)).unwrap_or(f64::NEG_INFINITY)
     }
 }

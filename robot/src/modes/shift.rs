@@ -115,10 +115,8 @@ fn centre_of_mass(scene: &Scene<'_>, torso: &Isometry3<f64>, posture: &JointVect
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::{joints::Side, model::Model};
+    use crate::{joints::Side, model::test_model};
 
     const EFFECTORS: [Effector; 4] = [
         Effector::Foot(Side::Right),
@@ -128,7 +126,7 @@ mod tests {
     ];
 
     fn with_scene(change: impl Fn(&mut JointVector), test: impl Fn(&PoseSettings, &Scene<'_>)) {
-        let model = Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap();
+        let model = test_model();
         let poses = PoseSettings::default();
         let mut stand = poses.posture(&poses.stand_rad);
         change(&mut stand);

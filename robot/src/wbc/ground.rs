@@ -248,8 +248,7 @@ mod tests {
 
     #[test]
     fn when_no_solver_finds_forces_the_last_ones_serve_within_their_present_limits() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot");
-        let model = Model::load(&folder).unwrap();
+        let model = crate::model::test_model();
         let mut position = JointVector::zeros();
         for leg in Leg::ALL {
             position.fixed_rows_mut::<3>(leg.first_joint()).copy_from_slice(&[0.0, 0.9, -1.8]);

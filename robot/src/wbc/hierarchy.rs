@@ -147,7 +147,7 @@ impl<const N: usize> TaskChain<N> {
     /// It makes of 1/σ the damped σ / (σ² + λ²) with λ² = start² - σ²: exact away from singularities,
     /// continuous into them, and never above 1 / start. `size` is that of the task's Jacobian.
     fn fade(&mut self, lower: &Matrix3<f64>, start: f64, size: f64) -> Projected {
-        let (left, _) = eigen(lower * lower.transpose());
+        let left = eigenvectors(lower * lower.transpose());
         let mut projected = Projected { count: 0, inverse: Matrix3::zeros(), damping: None };
         let mut kept = [0.0; 3];
         let mut turn = Matrix3::zeros();
@@ -247,8 +247,8 @@ fn inverse_of(lower: &Matrix3<f64>, count: usize) -> Matrix3<f64> {
     inverse
 }
 
-/// Eigenvectors (columns) and eigenvalues, greatest first, of a symmetric matrix, by cyclic Jacobi rotations.
-fn eigen(mut matrix: Matrix3<f64>) -> (Matrix3<f64>, [f64; 3]) {
+/// Eigenvectors (columns) of a symmetric matrix, that of the greatest eigenvalue first, by cyclic Jacobi rotations.
+fn eigenvectors(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
     /// Converges quadratically: three or four sweeps are the rule.
     const SWEEPS: usize = 12;
     let mut vectors = Matrix3::identity();
@@ -263,8 +263,7 @@ fn eigen(mut matrix: Matrix3<f64>) -> (Matrix3<f64>, [f64; 3]) {
     }
     let mut order = [0, 1, 2];
     order.sort_unstable_by(|a, b| matrix[(*b, *b)].total_cmp(&matrix[(*a, *a)]));
-    let sorted = Matrix3::from_fn(|row, column| vectors[(row, order[column])]);
-    (sorted, order.map(|index| matrix[(index, index)]))
+    Matrix3::from_fn(|row, column| vectors[(row, order[column])])
 }
 
 /// One Jacobi rotation: makes entry (p, q) zero.
@@ -330,8 +329,9 @@ mod tests {
     #[test]
     fn the_eigenvectors_of_a_symmetric_matrix_rebuild_it() {
         let matrix = Matrix3::new(4.0, 1.0, -2.0, 1.0, 3.0, 0.5, -2.0, 0.5, 1.0);
-        let (vectors, values) = eigen(matrix);
-        let rebuilt = vectors * Matrix3::from_diagonal(&Vector3::from(values)) * vectors.transpose();
+        let vectors = eigenvectors(matrix);
+        let values = (vectors.transpose() * matrix * vectors).diagonal();
+        let rebuilt = vectors * Matrix3::from_diagonal(&values) * vectors.transpose();
         assert!((rebuilt - matrix).amax() < 1e-14);
         assert!(values[0] >= values[1] && values[1] >= values[2]);
     }

@@ -16,7 +16,7 @@
 //! Both are projections onto polyhedra ([`crate::polyhedron`]), first the one, then the other, so that the command
 //! has no jump where a limit begins or ceases to act.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 
 use super::{
     ContactSet, Objective, ObjectiveKind, Tracked, WbcSettings,
@@ -24,10 +24,11 @@ use super::{
     objective::Robot,
 };
 use crate::{
-    collision::{Altitude, Clearance, Clearances, Ground, Link, MOST_NEAR, Part},
+    collision::{Altitude, Clearance, Clearances, Ground, Link, MOST_NEAR, Part, height_under},
     dynamics::{DOF, Dynamics, Motion, State},
     joints::{JOINTS, Leg, Side},
-    model::{FOOT_RADIUS_M, Frame, Model},
+    kinematics::inverse_of_leg,
+    model::{Frame, Model},
     polyhedron::Polyhedron,
 };
 
@@ -37,8 +38,8 @@ const MOST_ROWS: usize = 24 + MOST_NEAR;
 /// Shorter gradients of a distance are taken as this long, m/rad: there joints cannot change it.
 const SHORTEST_GRADIENT: f64 = 0.01;
 
-/// What is nearer than this to its limit is looked at, m: at the greatest speed of a
-/// target (0.5 m/s) the barrier begins to act at 0.033 m.
+/// What is nearer than this to its limit is looked at, m: at the greatest speed of a target (0.5 m/s) the barrier begins
+/// to act at 0.033 m.
 const INFLUENCE_M: f64 = 0.06;
 
 /// Share of the room between two links that a step may use up: the gradient turns on the way.
@@ -48,16 +49,13 @@ const STEP_SHARE: f64 = 0.5;
 /// leave. Small: position goes before orientation.
 const METRES_PER_RADIAN: f64 = 0.05;
 
-/// Motion of a free limb's joints that its objectives do not see counts like so many metres for each radian: joints
-/// do not run about for the last millimetre.
+/// Motion of joints that no objective sees counts like so many metres for each radian: joints do not run about for the
+/// last millimetre.
 const METRES_PER_JOINT: f64 = 0.02;
 
-/// The same for the torso's orientation against its position, where standing legs limit both: half its length.
+/// Where standing legs limit the torso, a radian of its orientation counts like so many metres of its position: half its
+/// length.
 const TORSO_METRES_PER_RADIAN: f64 = 0.2;
-
-/// λ of the damped inverse J_lᵀ (J_l J_lᵀ + λ²)⁻¹, m/rad: a leg whose least singular value is 20 times as long,
-/// nearly stretched, is still inverted to a quarter of a percent.
-const LEG_DAMPING: f64 = 1e-3;
 
 /// Joints of the legs; they come first.
 const LEG_JOINTS: usize = 12;
@@ -150,17 +148,18 @@ impl Stops {
         }
     }
 
-    /// Links of a limb in the air stay above the ground, but for a calf whose foot is being put down: what touches
-    /// it unplanned lifts the torso off its course.
+    /// Links of a limb in the air stay above the ground: what touches it unplanned lifts the torso off its course. Not
+    /// the calf of a foot that has a target of its own: who leads it keeps it up, or puts it down.
     fn limit_heights(&mut self, around: &Surroundings) {
         let Surroundings { model, state, dynamics, contacts, .. } = around;
-        let Some(height) = ground_height(around) else { return };
-        let ground = Ground::at(height, &state.world_from_torso);
+        let height = |leg| dynamics.frame(Frame::Foot(leg)).world_from_frame.translation.z;
+        let Some(ground_m) = height_under(contacts.legs().map(height)) else { return };
+        let ground = Ground::at(ground_m, &state.world_from_torso);
         for leg in Leg::ALL.into_iter().filter(|leg| !contacts.contains(*leg)) {
-            let lands = |objective: &Objective| objective.kind() == ObjectiveKind::FootPosition(leg);
-            let lands = around.objectives.iter().any(lands);
+            let leads = |objective: &Objective| objective.kind() == ObjectiveKind::FootPosition(leg);
+            let is_led = around.objectives.iter().any(leads);
             for end in ground.altitudes(leg, &model.collision, *dynamics) {
-                if !(lands && end.link.part == Part::Calf) {
+                if !(is_led && end.link.part == Part::Calf) {
                     self.limit_height(around, &ground, leg, &end);
                 }
             }
@@ -266,7 +265,7 @@ impl Stops {
                 let row = from_torso.row(joint).transpose();
                 self.polyhedron.enclose(row, chain.of(&self.joints[joint]), value);
             }
-            self.polyhedron.nearest(&metric).unwrap_or_default()
+            self.polyhedron.nearest(&Vector6::zeros(), &metric).unwrap_or_default()
         }))
     }
 
@@ -295,11 +294,11 @@ impl Stops {
             let mut metric = None;
             for chain in Chain::ALL {
                 self.enclose(leg, &joints, chain, solution);
-                if self.polyhedron.contains_zero() {
+                if self.polyhedron.contains(&Vector6::zeros()) {
                     continue;
                 }
                 let metric = metric.get_or_insert_with(|| metric_of(around, &joints));
-                let Some(change) = self.polyhedron.nearest(metric) else { continue };
+                let Some(change) = self.polyhedron.nearest(&Vector6::zeros(), metric) else { continue };
                 let motion = solution.chain_mut(chain);
                 for (joint, change) in joints.iter().zip(change.iter()) {
                     if let Some(joint) = joint {
@@ -379,7 +378,7 @@ impl Chain {
 }
 
 impl Polyhedron {
-    /// Keeps a joint, of this value before the change, in an interval.
+    /// Keeps a joint, of this value before a change, in an interval.
     fn enclose(&mut self, row: Vector6<f64>, interval: &Interval, value: f64) {
         self.push(row, interval.lower() - value);
         self.push(-row, value - interval.upper());
@@ -411,12 +410,9 @@ fn legs_from_torso(around: &Surroundings) -> SMatrix<f64, LEG_JOINTS, 6> {
     for leg in around.contacts.legs() {
         let jacobian = &around.dynamics.frame(Frame::Foot(leg)).jacobian;
         let of_torso = jacobian.fixed_view::<3, 6>(0, 0);
-        let of_joints = jacobian.fixed_view::<3, 3>(0, 6 + leg.first_joint());
-        let square = of_joints * of_joints.transpose() + Matrix3::identity() * LEG_DAMPING.powi(2);
-        if let Some(inverse) = square.try_inverse() {
-            let mut rows = legs.fixed_rows_mut::<3>(leg.first_joint());
-            rows.copy_from(&(of_joints.tr_mul(&inverse) * of_torso * -1.0));
-        }
+        let of_joints = jacobian.fixed_view::<3, 3>(0, 6 + leg.first_joint()).into_owned();
+        let mut rows = legs.fixed_rows_mut::<3>(leg.first_joint());
+        rows.copy_from(&(-inverse_of_leg(&of_joints) * of_torso));
     }
     legs
 }
@@ -439,12 +435,4 @@ fn metric_of(around: &Surroundings, joints: &[Option<usize>; 6]) -> Matrix6<f64>
         }
     }
     metric
-}
-
-/// Height of the ground under the feet that stand, in their mean; nothing without any.
-fn ground_height(around: &Surroundings) -> Option<f64> {
-    let height = |leg| around.dynamics.frame(Frame::Foot(leg)).world_from_frame.translation.z;
-    let (sum, count) =
-        around.contacts.legs().fold((0.0, 0.0), |(sum, count), leg| (sum + height(leg), count + 1.0));
-    (count > 0.0).then(|| sum / count - FOOT_RADIUS_M)
 }

@@ -66,10 +66,10 @@ impl Random {
     }
 }
 
-/// A moving robot: half of them near standing, half anywhere within the joints' ranges.
-pub fn state(random: &mut Random, model: &Model) -> State {
+/// A moving robot: half of them near standing, half anywhere within the joints' ranges; legs in the air drawn up.
+pub fn state(random: &mut Random, model: &Model, stance: &[Leg]) -> State {
     let near = random.number() < 0.0;
-    let position = JointVector::from_fn(|joint, _| {
+    let mut position = JointVector::from_fn(|joint, _| {
         let (lower, upper) = (model.lower[joint], model.upper[joint]);
         if near {
             (stand()[joint] + 0.35 * random.number()).clamp(lower, upper)
@@ -77,6 +77,7 @@ pub fn state(random: &mut Random, model: &Model) -> State {
             lower + random.share() * (upper - lower)
         }
     });
+    draw_up(&mut position, stance, model);
     let tilt = random.vector(0.3);
     State {
         world_from_torso: Isometry3::from_parts(
@@ -90,12 +91,11 @@ pub fn state(random: &mut Random, model: &Model) -> State {
 }
 
 /// Draws up the legs that do not stand: one in the air that is as low as the others touches the ground.
-#[allow(dead_code, reason = "not every test that takes situations from here needs legs off the ground")]
-pub fn draw_up(state: &mut State, stance: &[Leg], model: &Model) {
+fn draw_up(position: &mut JointVector, stance: &[Leg], model: &Model) {
     const BY_RAD: f64 = 0.3;
     for leg in Leg::ALL.into_iter().filter(|leg| !stance.contains(leg)) {
         let calf = leg.first_joint() + 2;
-        state.position[calf] = (state.position[calf] - BY_RAD).max(model.lower[calf]);
+        position[calf] = (position[calf] - BY_RAD).max(model.lower[calf]);
     }
 }
 

@@ -6,6 +6,7 @@
 //! Left parts are the mirror image in y of the right ones.
 
 use locoman_robot::joints::Side;
+use locoman_robot::model::FOOT_RADIUS_M;
 
 /// A primitive in its link's frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,9 +35,6 @@ pub enum Shape {
         half: [f64; 3],
     },
 }
-
-/// Radius of a foot, m: the one that the controller's model has.
-pub const FOOT_RADIUS_M: f64 = 0.02;
 
 const fn sphere(center: [f64; 3], radius: f64) -> Shape {
     Shape::Sphere { center, radius }

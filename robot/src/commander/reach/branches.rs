@@ -111,23 +111,21 @@ fn wrapped(angle: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{joints::JointVector, kinematics::torso_from_frame, model::Frame};
-
-    fn model() -> Model {
-        Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-    }
+    use crate::{
+        joints::JointVector,
+        kinematics::torso_from_frame,
+        model::{Frame, test_model},
+    };
 
     proptest! {
         #[test]
         fn every_branch_reaches_the_pose_and_one_is_where_the_joints_are(
             angles in prop::array::uniform6(-3.1..3.1f64), left in any::<bool>(),
         ) {
-            let model = model();
+            let model = test_model();
             let side = if left { Side::Left } else { Side::Right };
             let mut joints = JointVector::zeros();
             let put = |joints: &mut JointVector, limb: &Vector6<f64>| {

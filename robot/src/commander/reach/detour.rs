@@ -48,8 +48,11 @@ impl Detour {
         self.goal = *goal;
     }
 
-    /// What the joints should change by.
-    pub(super) fn change(&self, limb: &Vector6<f64>, dt_s: f64) -> Vector6<f64> {
+    /// What the joints should change by: towards the goal, or to come to rest.
+    pub(super) fn change(&self, limb: &Vector6<f64>, rests: bool, dt_s: f64) -> Vector6<f64> {
+        if rests {
+            return self.towards(&Vector6::zeros(), dt_s) * dt_s;
+        }
         let gap = self.goal - limb;
         let at_speed_s = gap.zip_map(&SPEEDS_RAD_S.into(), |gap, speed| gap.abs() / speed).max();
         // v² = 2 a |gap| with half of the acceleration.
@@ -67,10 +70,10 @@ impl Detour {
 
     /// After the joints have changed by what was permitted.
     #[must_use]
-    pub(super) fn after(&self, change: &Vector6<f64>, limb: &Vector6<f64>, dt_s: f64) -> Self {
+    pub(super) fn after(&self, change: &Vector6<f64>, limb: &Vector6<f64>, rests: bool, dt_s: f64) -> Self {
         let gap = self.goal - limb;
         let closing = change.dot(&gap) / (gap.norm().max(ARRIVED_RAD) * dt_s);
-        let stopped_s = if closing < STOPPED_RAD_S { self.stopped_s + dt_s } else { 0.0 };
+        let stopped_s = if closing < STOPPED_RAD_S && !rests { self.stopped_s + dt_s } else { 0.0 };
         Self { velocity: self.towards(&(change / dt_s), dt_s), stopped_s, ..*self }
     }
 

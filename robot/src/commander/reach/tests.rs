@@ -1,16 +1,14 @@
-use std::path::Path;
-
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::{prelude::*, test_runner::RngSeed};
 
 use super::*;
-use crate::{commander::Limits, kinematics::torso_from_frame, model::Frame};
+use crate::{
+    commander::Limits,
+    kinematics::torso_from_frame,
+    model::{Frame, test_model},
+};
 
 const DT_S: f64 = 0.0025;
-
-fn model() -> Model {
-    Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-}
 
 /// Standing on three legs, the right gripper ready, the left arm folded.
 fn ready() -> JointVector {
@@ -44,7 +42,7 @@ struct Walk {
 
 impl Walk {
     fn new() -> Self {
-        let model = model();
+        let model = test_model();
         let last = gripper(&model, &ready());
         let sut = Reach::new(Side::Right, &ready(), Limits::default().reach);
         Self { model, sut, last, fastest: 0.0, turn: 0.0 }
@@ -121,7 +119,7 @@ fn displaced(pose: &Isometry3<f64>, by: &Isometry3<f64>) -> Isometry3<f64> {
 #[test]
 fn far_targets_are_followed_to_the_nearest_pose_and_back() {
     const TARGETS: usize = 30;
-    let model = model();
+    let model = test_model();
     let mut random = random(1);
     let start = gripper(&model, &ready());
     let mut excess: Vec<f64> = Vec::new();
@@ -203,7 +201,7 @@ fn far_trajectory(model: &Model, random: &mut impl FnMut() -> f64, with_detours:
 #[test]
 fn a_gripper_comes_back_from_wherever_it_was_led() {
     const TRAJECTORIES: usize = 100;
-    let model = model();
+    let model = test_model();
     let mut back = [0, 0];
     for (with_detours, back) in [false, true].into_iter().zip(&mut back) {
         let mut random = random(7);
@@ -253,17 +251,51 @@ fn a_target_that_nothing_meets_causes_no_detour() {
     }
 }
 
-#[test]
-fn a_detour_that_is_called_off_ends_there() {
+/// On a detour of half a turn for half a second, and where to: the hand is at the end of its range.
+fn under_way() -> (Walk, Isometry3<f64>) {
     let mut walk = Walk::new();
-    let start = walk.last;
-    // Half a turn of the gripper's hand at its end of range: the other way round is a detour.
+    let goal = walk.last;
     let column = 5;
     walk.sut.joints[Side::Right.limb_joints()[column]] = walk.sut.range(&walk.model, column).max;
     while walk.sut.detour.is_none() {
-        walk.to(&start, &start, DT_S);
+        walk.to(&goal, &goal, DT_S);
     }
-    walk.to(&start, &start, 0.5);
+    walk.to(&goal, &goal, 0.5);
+    (walk, goal)
+}
+
+#[test]
+fn r_safe_001_a_detour_rests_while_commands_stay_away_and_goes_on_with_them() {
+    let (mut walk, goal) = under_way();
+    walk.sut.pause(true);
+    let moving = walk.sut.joints;
+    walk.to(&goal, &goal, DT_S);
+    assert!((walk.sut.joints - moving).amax() > 1e-3, "it is under way");
+    walk.to(&goal, &goal, 0.25);
+    let rest = walk.sut.joints;
+    // Longer than one that is barred would be tried.
+    walk.to(&goal, &goal, 1.0);
+    assert_eq!(walk.sut.joints, rest);
+    walk.sut.pause(false);
+    assert!(miss(&goal, &walk.to(&goal, &goal, 4.0)) < 1e-4);
+}
+
+#[test]
+fn no_detour_begins_while_commands_stay_away() {
+    let mut walk = Walk::new();
+    let goal = walk.last;
+    let column = 5;
+    walk.sut.joints[Side::Right.limb_joints()[column]] = walk.sut.range(&walk.model, column).max;
+    walk.sut.pause(true);
+    for _ in 0..1000 {
+        walk.to(&goal, &goal, DT_S);
+        assert!(walk.sut.detour.is_none());
+    }
+}
+
+#[test]
+fn a_detour_that_is_called_off_ends_there() {
+    let (mut walk, _) = under_way();
     walk.sut.stay();
     let here = walk.last;
     let there = walk.to(&here, &here, 1.0);

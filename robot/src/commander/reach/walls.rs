@@ -73,11 +73,10 @@ impl Walls {
         self.walls[..self.count].iter().map(|wall| wall.room).fold(INFLUENCE_M, f64::min)
     }
 
-    /// Adds them to what a change of the joints must satisfy, seen from a change that is wanted: what is too near
-    /// is taken away by `recovery_m` at most.
-    pub(super) fn enclose(&self, polyhedron: &mut Polyhedron, wanted: &Vector6<f64>, recovery_m: f64) {
+    /// Adds them to what a change of the joints must satisfy: what is too near is taken away by `recovery_m` at most.
+    pub(super) fn enclose(&self, polyhedron: &mut Polyhedron, recovery_m: f64) {
         for wall in &self.walls[..self.count] {
-            polyhedron.push(wall.slope, (-wall.room).min(recovery_m) - wall.slope.dot(wanted));
+            polyhedron.push(wall.slope, (-wall.room).min(recovery_m));
         }
     }
 

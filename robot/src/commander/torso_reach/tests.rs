@@ -1,16 +1,14 @@
-use std::path::Path;
-
 use proptest::prelude::*;
 
 use super::*;
-use crate::{commander::Limits, kinematics::torso_from_frame, model::Frame};
+use crate::{
+    commander::Limits,
+    kinematics::torso_from_frame,
+    model::{FOOT_RADIUS_M, Frame, test_model},
+};
 
 const DT_S: f64 = 0.0025;
 const MARGIN_M: f64 = 0.02;
-
-fn model() -> Model {
-    Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-}
 
 fn range() -> ReachRange {
     Limits::default().reach
@@ -24,6 +22,16 @@ fn stand() -> JointVector {
     joints
 }
 
+fn footing(feet: &[(Leg, Vector3<f64>)]) -> Footing<'_> {
+    Footing {
+        feet,
+        com_from_torso: Vector2::zeros(),
+        margin_m: MARGIN_M,
+        ground_m: feet[0].1.z - FOOT_RADIUS_M,
+        range: range(),
+    }
+}
+
 /// A robot on three or four feet.
 struct Stand {
     model: Model,
@@ -33,7 +41,7 @@ struct Stand {
 
 impl Stand {
     fn new(legs: &[Leg]) -> Self {
-        let model = model();
+        let model = test_model();
         let at = |leg| torso_from_frame(&model, &stand(), Frame::Foot(leg)).translation.vector;
         let feet = legs.iter().map(|leg| (*leg, at(*leg))).collect();
         // On three feet it begins well inside their triangle.
@@ -42,23 +50,12 @@ impl Stand {
         Self { sut: TorsoReach::new(&torso, &stand()), model, feet }
     }
 
-    fn footing(&self) -> Footing<'_> {
-        Footing {
-            feet: &self.feet,
-            com_from_torso: Vector2::zeros(),
-            margin_m: MARGIN_M,
-            ground_m: self.feet[0].1.z - crate::model::FOOT_RADIUS_M,
-            range: range(),
-        }
-    }
-
     fn to(&mut self, target: &Isometry3<f64>) -> Isometry3<f64> {
         let (start, mut last) = (self.sut.torso, self.sut.torso);
         for tick in 1..=800 {
             let wanted = start.lerp_slerp(target, (f64::from(tick) / 400.0).min(1.0));
-            let mut sut = self.sut.clone();
-            let now = sut.nearest(&self.model, &self.footing(), &wanted, DT_S);
-            self.sut = sut;
+            let Self { model, feet, sut } = self;
+            let now = sut.nearest(model, &footing(feet), &wanted, DT_S);
             let moved = (now.translation.vector - last.translation.vector).norm();
             let turned = now.rotation.angle_to(&last.rotation);
             assert!(moved < 1.01 * SPEED_M_S * DT_S && turned < 1.01 * SPEED_RAD_S * DT_S, "{tick}");
@@ -75,14 +72,13 @@ impl Stand {
             let com = from_above(&self.sut.torso.translation.vector);
             way = way.min(inwards.dot(&(com - corner)) - MARGIN_M);
         }
-        let ground = Ground::at(self.footing().ground_m, &self.sut.torso);
+        let ground = Ground::at(footing(&self.feet).ground_m, &self.sut.torso);
         let bodies = body_poses(&self.model, &self.sut.joints);
         for (leg, foot) in &self.feet {
             let reached = self.sut.torso * torso_from_frame(&self.model, &self.sut.joints, Frame::Foot(*leg));
             let off = (reached.translation.vector - foot).norm();
             assert!(off < 1e-3, "{leg:?} {off} {} {}", self.sut.joints, self.sut.torso);
-            let ranges = [range().hip, range().thigh, range().calf];
-            for (joint, range) in (leg.first_joint()..).zip(ranges) {
+            for (joint, range) in (leg.first_joint()..).zip(range().leg()) {
                 let at = self.sut.joints[joint];
                 angle = angle.min(at - range.min).min(range.max - at);
             }

@@ -9,15 +9,11 @@ use crate::{
     collision::Clearances,
     joints::{JointVector, Leg, Side},
     kinematics::torso_from_frame,
-    model::Frame,
+    model::{Frame, test_model},
     wbc::{PointReference, RotationReference},
 };
 
 const DT_S: f64 = 0.0025;
-
-fn model() -> Model {
-    Model::load(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-}
 
 /// Three legs standing, the right front one in the air with its arm forward.
 fn ready() -> State {
@@ -159,7 +155,7 @@ proptest! {
     fn whatever_the_gripper_is_asked_for_limits_are_kept_smoothly_and_left_again(
         far in prop::array::uniform3(-0.5..0.5f64), turn in prop::array::uniform3(-1.2..1.2f64),
     ) {
-        let mut plant = Plant::new(model(), ready());
+        let mut plant = Plant::new(test_model(), ready());
         let start = plant.gripper();
         let goal = Isometry3::from_parts(
             (start.translation.vector + Vector3::from(far)).into(),
@@ -192,7 +188,7 @@ fn with_wrist(angle: f64) -> State {
 #[test]
 fn the_wrist_goes_through_its_singularity_without_a_jerk() {
     for sideways in [0.0, 0.2, -0.2, 0.6, -0.6] {
-        let mut plant = Plant::new(model(), with_wrist(-1.2));
+        let mut plant = Plant::new(test_model(), with_wrist(-1.2));
         let start = plant.gripper();
         let through =
             torso_from_frame(&plant.model, &with_wrist(-1.95).position, Frame::Gripper(Side::Right));
@@ -222,7 +218,7 @@ fn the_wrist_goes_through_its_singularity_without_a_jerk() {
 #[test]
 fn a_limb_that_is_called_beyond_its_length_stretches_and_comes_back() {
     for far in [Vector3::new(0.4, 0.0, 0.0), Vector3::new(0.3, -0.3, 0.2), Vector3::new(0.35, 0.0, 0.3)] {
-        let mut plant = Plant::new(model(), ready());
+        let mut plant = Plant::new(test_model(), ready());
         let start = plant.gripper();
         let goal = Isometry3::from_parts((start.translation.vector + far).into(), start.rotation);
         plant.lead(&start, &goal, 2.0);
@@ -248,7 +244,7 @@ fn a_torso_that_is_called_beyond_its_legs_stops_where_they_end_and_comes_back() 
         ([0.0; 3], [-0.5, 0.8, 0.6]),
     ];
     for (far, turn) in calls {
-        let mut plant = Plant::new(model(), ready());
+        let mut plant = Plant::new(test_model(), ready());
         let (gripper, start) = (plant.gripper(), plant.torso);
         let goal = Isometry3::from_parts(
             (start.translation.vector + Vector3::from(far)).into(),

@@ -7,7 +7,7 @@ use super::*;
 use crate::{
     collision::{CollisionModel, Ground},
     joints::{JointVector, Leg, Side},
-    model::{FOOT_RADIUS_M, Frame},
+    model::{FOOT_RADIUS_M, Frame, test_model},
     wbc::{PointReference, RotationReference, StopSettings},
 };
 
@@ -15,10 +15,6 @@ use crate::{
 const LEAKAGE: f64 = 1e-8;
 /// Rounding grows with the size of the accelerations.
 const RELATIVE: f64 = 1e-11;
-
-fn model() -> Model {
-    Model::load(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
-}
 
 /// Settings that let everything go through the ground.
 fn bottomless(settings: WbcSettings) -> WbcSettings {
@@ -109,7 +105,7 @@ proptest! {
         numbers in numbers(48),
         demands in numbers(72),
     ) {
-        let mut model = model();
+        let mut model = test_model();
         // Links of random postures overlap, and push joints beyond anything.
         model.collision = CollisionModel::default();
         let state = random_state(&model, &numbers);
@@ -132,7 +128,7 @@ proptest! {
 
     #[test]
     fn no_objective_moves_a_stance_foot_or_a_higher_one(numbers in numbers(48), demands in numbers(72)) {
-        let mut model = model();
+        let mut model = test_model();
         let state = random_state(&model, &numbers);
         without_ends(&mut model);
         let objectives = random_objectives(&demands);
@@ -174,7 +170,7 @@ proptest! {
 
 #[test]
 fn objectives_that_can_be_reached_are_reached() {
-    let mut model = model();
+    let mut model = test_model();
     without_ends(&mut model);
     let mut position = JointVector::zeros();
     for leg in Leg::ALL {
@@ -216,7 +212,7 @@ fn objectives_that_can_be_reached_are_reached() {
 
 #[test]
 fn a_lifted_foot_stays_above_the_ground_when_its_gripper_is_called_below() {
-    let model = model();
+    let model = test_model();
     let mut position = JointVector::zeros();
     for leg in Leg::ALL {
         position.fixed_rows_mut::<3>(leg.first_joint()).copy_from_slice(&[0.0, 0.9, -1.8]);

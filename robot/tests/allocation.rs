@@ -1,4 +1,6 @@
-//! The control step takes no memory once it is running.
+//! Control steps and reaching take no memory once they run.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -7,14 +9,17 @@ use std::{
 };
 
 use locoman_robot::{
+    collision::Ground,
+    commander::{Footing, Limits, Reach, TorsoReach},
     dynamics::State,
     joints::{JointVector, Leg, Side},
-    model::Model,
+    kinematics::torso_from_frame,
+    model::{FOOT_RADIUS_M, Frame, Model},
     wbc::{
         ContactSet, Objective, PointReference, RotationReference, WbcOutput, WbcSettings, WholeBodyController,
     },
 };
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -40,6 +45,10 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+fn model() -> Model {
+    Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
+}
+
 fn stand() -> JointVector {
     let mut position = JointVector::zeros();
     for leg in Leg::ALL {
@@ -50,7 +59,7 @@ fn stand() -> JointVector {
 
 #[test]
 fn the_control_step_allocates_nothing() {
-    let model = Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap();
+    let model = model();
     let mut sut = WholeBodyController::new(WbcSettings::default());
     let mut state = State::at_rest(stand());
     let mut output = WbcOutput::hold(state.position);
@@ -81,5 +90,49 @@ fn the_control_step_allocates_nothing() {
         counted += ALLOCATIONS.get() - before;
         assert_eq!(output.status.fault, None);
     }
+    assert_eq!(counted, 0);
+}
+
+/// The torso leans to where limits stop it, the hand turns until a detour takes it the other way round.
+#[test]
+fn reaching_allocates_nothing_also_at_limits_and_on_a_detour() {
+    const DT_S: f64 = 0.0025;
+    let (model, limits) = (model(), Limits::default());
+    let mut joints = stand();
+    joints.fixed_rows_mut::<3>(0).copy_from_slice(&[-0.1, 0.9, -2.2]);
+    joints.fixed_rows_mut::<3>(12).copy_from_slice(&[-0.4, 0.0, 0.0]);
+    let at = |frame| torso_from_frame(&model, &joints, frame);
+    let feet = [Leg::FrontLeft, Leg::RearRight, Leg::RearLeft]
+        .map(|leg| (leg, at(Frame::Foot(leg)).translation.vector));
+    let ground_m = feet[0].1.z - FOOT_RADIUS_M;
+    let footing = Footing {
+        feet: &feet,
+        com_from_torso: Vector2::new(-0.04, 0.04),
+        margin_m: limits.support_margin_m,
+        ground_m,
+        range: limits.reach,
+    };
+    let mut torso_reach = TorsoReach::new(&Isometry3::identity(), &joints);
+    let mut reach = Reach::new(Side::Right, &joints, limits.reach);
+    let gripper = at(Frame::Gripper(Side::Right));
+
+    let (mut counted, mut detours, mut held_back) = (0, 0, 0.0_f64);
+    for step in 0..6000_u32 {
+        let share = (f64::from(step) / 2000.0).min(1.0);
+        let lean = Isometry3::new(Vector3::new(0.1, 0.0, 0.1) * share, Vector3::new(0.0, 0.5, 0.0) * share);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 4.5 * share);
+        let before = ALLOCATIONS.get();
+        let torso = torso_reach.nearest(&model, &footing, &lean, DT_S);
+        let ground = Ground::at(ground_m, &Isometry3::identity());
+        reach.nearest(&model, &joints, &ground, &(gripper * turn), DT_S);
+        let detour = reach.detour(&model);
+        counted += ALLOCATIONS.get() - before;
+        held_back = held_back.max((torso.translation.vector - lean.translation.vector).norm());
+        detours += u32::from(detour.is_some());
+        for (joint, angle) in Side::Right.limb_joints().into_iter().zip(reach.limb().iter()) {
+            joints[joint] = *angle;
+        }
+    }
+    assert!(detours > 100 && held_back > 0.01, "{detours} {held_back}");
     assert_eq!(counted, 0);
 }
