@@ -83,12 +83,12 @@ pub fn report(tracker: &Tracker, update: &TrackUpdate, feed: Option<&Feed>) -> m
         tags: u32::try_from(seen.tags).unwrap_or(u32::MAX),
         cameras: u32::try_from(seen.cameras).unwrap_or(u32::MAX),
     });
-    let cameras = tracker.rig().cameras.iter().zip(&update.cameras).enumerate();
-    let cameras = cameras.map(|(index, (camera, seen))| CameraStats {
+    let cameras = tracker.rig().cameras.iter().enumerate();
+    let cameras = cameras.map(|(index, camera)| CameraStats {
         camera: camera.id.clone(),
         frames: feed.and_then(|feed| feed.frames.get(index)).map_or(0, |n| n.load(Ordering::Relaxed)),
         dropped: feed.and_then(|feed| feed.dropped.get(index)).map_or(0, |n| n.load(Ordering::Relaxed)),
-        tags: u32::try_from(seen.tags.len()).unwrap_or(u32::MAX),
+        tags: update.camera(index).map_or(0, |seen| u32::try_from(seen.tags.len()).unwrap_or(u32::MAX)),
     });
     messages::Tracking {
         shells: shells.collect(),

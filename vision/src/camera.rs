@@ -34,6 +34,8 @@ pub struct Camera {
     pub distortion: Distortion,
     /// Pose of the camera in the world.
     pub world_from_camera: Isometry3<f64>,
+    /// Time from the exposure of one row to that of the next; 0 for a global shutter.
+    pub line_time_s: f64,
 }
 
 /// Points nearer to the image plane than this (metres along z) are not projected.
@@ -54,11 +56,21 @@ impl Camera {
         }
         let inv_z = 1.0 / p.z;
         let ideal = Vector2::new(p.x * inv_z, p.y * inv_z);
-        let (distorted, d_distorted) = self.distortion.distort(ideal);
         let d_ideal = Matrix2x3::new(inv_z, 0.0, -ideal.x * inv_z, 0.0, inv_z, -ideal.y * inv_z);
-        let scale = Matrix2::from_diagonal(&self.focal_px);
-        let pixel = Point2::from(scale * distorted + self.center_px);
-        Some((pixel, scale * d_distorted * d_ideal))
+        let (pixel, by_ideal) = self.pixel_of_ideal_with_jacobian(ideal);
+        Some((pixel, by_ideal * d_ideal))
+    }
+
+    /// The pixel of ideal image coordinates (x/z, y/z).
+    pub fn pixel_of_ideal(&self, ideal: Vector2<f64>) -> Point2<f64> {
+        self.pixel_of_ideal_with_jacobian(ideal).0
+    }
+
+    /// [`Camera::pixel_of_ideal`] and its derivative (2x2).
+    pub fn pixel_of_ideal_with_jacobian(&self, ideal: Vector2<f64>) -> (Point2<f64>, Matrix2<f64>) {
+        let (distorted, derivative) = self.distortion.distort(ideal);
+        let pixel = Point2::from(self.focal_px.component_mul(&distorted) + self.center_px);
+        (pixel, Matrix2::from_diagonal(&self.focal_px) * derivative)
     }
 
     /// The ray (x, y, 1) in the camera frame that a pixel sees.
@@ -66,6 +78,12 @@ impl Camera {
         let distorted = (pixel.coords - self.center_px).component_div(&self.focal_px);
         let ideal = self.distortion.undistort(distorted);
         Vector3::new(ideal.x, ideal.y, 1.0)
+    }
+
+    /// When a row was exposed, seconds after the capture time: that is when the middle row was, halfway through
+    /// its exposure.
+    pub fn row_delay_s(&self, y_px: f64) -> f64 {
+        (y_px - 0.5 * f64::from(self.height.saturating_sub(1))) * self.line_time_s
     }
 
     /// Whether a pixel lies inside the image.

@@ -15,10 +15,13 @@ mod region;
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point2;
+use nalgebra::{Point2, SMatrix};
 
 use crate::image::GrayImage;
 pub use region::{Rect, Region};
+
+/// Covariance of a tag's corners in px²: x, y of the first, x, y of the second, …
+pub type CornerCovariance = SMatrix<f64, 8, 8>;
 
 /// A tag found in an image.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +36,8 @@ pub struct Detection {
     pub corners_px: [Point2<f64>; 4],
     /// The resolution at which it was searched, as [`Region::decimate`].
     pub decimate: f32,
+    /// How sure its corners are; `None` where nothing but their number of pixels tells.
+    pub covariance_px2: Option<CornerCovariance>,
 }
 
 impl Detection {
@@ -137,7 +142,14 @@ fn accept(raw: &ffi::Raw, window: region::Window, decimate: f32) -> Option<Detec
         Point2::new(x - 0.5, y - 0.5)
     });
     let finite = corners_px.iter().all(|corner| corner.coords.iter().all(|c| c.is_finite()));
-    (good && finite).then_some(Detection { id: raw.id, hamming: raw.hamming, margin, corners_px, decimate })
+    (good && finite).then_some(Detection {
+        id: raw.id,
+        hamming: raw.hamming,
+        margin,
+        corners_px,
+        decimate,
+        covariance_px2: None,
+    })
 }
 
 #[cfg(test)]

@@ -17,6 +17,8 @@ pub struct Rig {
     pub cameras: Vec<Camera>,
     /// Where the images of each camera come from when it is live; as many as there are cameras.
     pub sources: Vec<CameraSource>,
+    /// Cameras with the same number are exposed together; as many as there are cameras.
+    pub sync_groups: Vec<usize>,
 }
 
 /// Where the images of a camera come from when it is live.
@@ -44,10 +46,11 @@ pub enum Half {
 }
 
 impl Rig {
-    /// A rig of cameras that have no live source.
+    /// A rig of cameras that have no live source and are exposed together.
     pub fn new(cameras: Vec<Camera>) -> Self {
         let sources = vec![CameraSource::default(); cameras.len()];
-        Self { cameras, sources }
+        let sync_groups = vec![0; cameras.len()];
+        Self { cameras, sources, sync_groups }
     }
 
     /// Reads and checks a rig file.
@@ -64,9 +67,14 @@ impl Rig {
         let file: RigFile = source.parse()?;
         let mut rig = Self::new(Vec::new());
         let mut ids = HashSet::new();
+        let mut group_names: Vec<String> = Vec::new();
         for entry in file.camera {
             let offset = entry.span().start;
             let entry = entry.into_inner();
+            let sync_group = group_names.iter().position(|name| *name == entry.sync).unwrap_or_else(|| {
+                group_names.push(entry.sync.clone());
+                group_names.len() - 1
+            });
             let (camera, live) = entry.check().map_err(|fault| source.error(offset, fault))?;
             if !ids.insert(camera.id.clone()) {
                 let problem = format!("camera id `{}` is used twice", camera.id);
@@ -74,6 +82,7 @@ impl Rig {
             }
             rig.cameras.push(camera);
             rig.sources.push(live);
+            rig.sync_groups.push(sync_group);
         }
         if rig.cameras.is_empty() {
             let fault = Fault::new("no camera", "add a [[camera]] table for each camera");
@@ -104,6 +113,10 @@ struct CameraEntry {
     #[serde(default)]
     distortion: Vec<f64>,
     world_from_camera: PoseEntry,
+    #[serde(default)]
+    line_time_us: f64,
+    #[serde(default)]
+    sync: String,
     #[serde(default)]
     source: CameraSource,
 }
@@ -144,6 +157,15 @@ impl CameraEntry {
                 "write positive focal lengths in pixels",
             ));
         }
+        /// No sensor takes longer than this to read one row.
+        const MOST_LINE_TIME_US: f64 = 1000.0;
+        if !(0.0..=MOST_LINE_TIME_US).contains(&self.line_time_us) {
+            return Err(Fault::new(
+                format!("camera `{id}` has a line time of {} microseconds", self.line_time_us),
+                "write the time between two rows in microseconds (about 30 for a 1080p webcam), 0 for a global \
+                 shutter",
+            ));
+        }
         let distortion = distortion(self.model, &self.distortion)
             .map_err(|fault| Fault { problem: format!("camera `{id}`: {}", fault.problem), ..fault })?;
         let world_from_camera = self.world_from_camera.to_isometry("world_from_camera")?;
@@ -155,6 +177,7 @@ impl CameraEntry {
             center_px: Vector2::new(cx, cy),
             distortion,
             world_from_camera,
+            line_time_s: self.line_time_us * 1e-6,
         };
         Ok((camera, self.source))
     }
@@ -197,6 +220,7 @@ fy = 700.5
 cx = 640
 cy = 360
 distortion = [-0.1, 0.01, 0.0, 0.0, 0.002]
+line_time_us = 25.6
 world_from_camera = { xyz = [1.0, 0.0, 1.4], quat = [0.5, -0.5, 0.5, -0.5] }
 source = { device = "/dev/video0", half = "left" }
 "#;
@@ -229,7 +253,7 @@ source = { device = "/dev/video0", half = "left" }
     #[test]
     fn a_typo_inside_a_pose_is_named_with_its_line() {
         let message = complaint(&GOOD.replace("quat", "qaut"));
-        assert!(message.starts_with("rig.toml:12:"), "{message}");
+        assert!(message.starts_with("rig.toml:13:"), "{message}");
         assert!(message.ends_with("did you mean `quat`?"), "{message}");
     }
 
@@ -242,7 +266,7 @@ source = { device = "/dev/video0", half = "left" }
     #[test]
     fn a_camera_named_twice_is_refused_where_it_is_named_again() {
         let message = complaint(&format!("{GOOD}{GOOD}"));
-        assert!(message.starts_with("rig.toml:15: camera id `left` is used twice"), "{message}");
+        assert!(message.starts_with("rig.toml:16: camera id `left` is used twice"), "{message}");
     }
 
     #[test]
@@ -251,6 +275,7 @@ source = { device = "/dev/video0", half = "left" }
             ("width = 1280", "width = 0", "0x720"),
             ("fx = 700", "fx = -700", "focal lengths -700"),
             ("cy = 360", "cy = nan", "not finite"),
+            ("line_time_us = 25.6", "line_time_us = -1", "line time of -1"),
             ("0.002]", "0.002, 0.0]", "6 distortion coefficients"),
             ("[0.5, -0.5,", "[0.5, 0.9,", "norm"),
             ("[1.0, 0.0, 1.4]", "[1.0, inf, 1.4]", "not finite"),

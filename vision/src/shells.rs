@@ -83,6 +83,13 @@ impl ShellSet {
         self.shells.iter().position(|shell| shell.name == name)
     }
 
+    /// The palm that a thumb is on, by their names; `None` for every other shell.
+    pub fn palm_of(&self, shell: usize) -> Option<usize> {
+        let name = &self.shells.get(shell)?.name;
+        let palm = name.strip_suffix("thumb").map(|side| format!("{side}palm"))?;
+        self.shell_index(&palm)
+    }
+
     fn from_source(source: &Source) -> Result<Self, ConfigError> {
         /// Number of codes in tag36h11.
         const CODES: u32 = 587;

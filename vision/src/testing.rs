@@ -18,6 +18,7 @@ pub fn rig() -> Rig {
         center_px: Vector2::new(641.5, 357.0),
         distortion: Distortion::RadTan([-0.09, 0.03, 3e-4, -2e-4, 0.0, 0.0, 0.0, 0.0]),
         world_from_camera: looking(Point3::new(1.15, y, 1.4), Point3::new(0.3, y * 0.15, 1.12)),
+        line_time_s: 0.0,
     };
     Rig::new(vec![
         camera("right_a", -0.56),

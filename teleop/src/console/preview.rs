@@ -48,7 +48,7 @@ pub(super) fn message(
     names: &[String],
     dropped: u64,
 ) -> Result<Option<Vec<u8>>, ImageError> {
-    let (Some(camera), Some(seen)) = (rig.cameras.get(frame.camera), update.cameras.get(frame.camera)) else {
+    let (Some(camera), Some(seen)) = (rig.cameras.get(frame.camera), update.camera(frame.camera)) else {
         return Ok(None);
     };
     let shells = names.iter().zip(&update.shells);

@@ -15,6 +15,7 @@ fn camera(distortion: Distortion) -> Camera {
         center_px: Vector2::new(642.3, 355.1),
         distortion,
         world_from_camera: Isometry3::identity(),
+        line_time_s: 0.0,
     }
 }
 

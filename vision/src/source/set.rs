@@ -13,12 +13,14 @@ pub struct FrameSet {
 impl FrameSet {
     /// The instant of the set: the mean of its capture times; 0 if it is empty.
     pub fn time_ns(&self) -> u64 {
-        let Some(first) = self.frames.first() else { return 0 };
-        let offset = |frame: &Frame| i128::from(frame.capture_ns) - i128::from(first.capture_ns);
-        let sum: i128 = self.frames.iter().map(offset).sum();
-        let mean = sum / self.frames.len() as i128;
-        u64::try_from(i128::from(first.capture_ns) + mean).unwrap_or(first.capture_ns)
+        mean_ns(self.frames.iter().map(|frame| frame.capture_ns))
     }
+}
+
+/// The mean of times, without overflow; 0 of none.
+pub fn mean_ns(times: impl Iterator<Item = u64>) -> u64 {
+    let (sum, count) = times.fold((0_u128, 0_u128), |(sum, count), t| (sum + u128::from(t), count + 1));
+    sum.checked_div(count).map_or(0, |mean| u64::try_from(mean).unwrap_or(u64::MAX))
 }
 
 /// Groups the frames of a source into sets.

@@ -1,5 +1,4 @@
-//! Where each camera searches: round the predicted tags of each shell, as finely as their size asks for;
-//! the whole image only for what is lost, one camera at a time so that no update is late.
+//! Where a camera searches: round the predicted tags of each shell, as finely as their size asks for.
 //!
 //! Thumb tags are too small for a search of the whole image: a lost thumb is searched round its palm.
 
@@ -7,63 +6,30 @@ use nalgebra::{Point2, Point3, Vector3};
 
 use super::TrackerSettings;
 use super::filter::Motion;
-use super::shell::ShellTracker;
 use crate::camera::Camera;
 use crate::detect::{Rect, Region};
-use crate::rig::Rig;
 use crate::shells::{Shell, ShellSet};
-
-/// What one camera searches at one instant.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Plan {
-    pub regions: Vec<Region>,
-    /// Search the whole image, too, at this reduction.
-    pub full_decimate: Option<f32>,
-}
 
 /// Tags seen more obliquely than this (cosine of the angle between normal and line of sight) are not waited for.
 const FACING_COS: f64 = 0.2;
 
-/// A plan for each camera of the rig.
-pub(super) fn plan(
-    rig: &Rig,
+/// Where one camera searches, given where the shells are; for lost thumbs only if it is its turn.
+pub(super) fn regions(
+    camera: &Camera,
     shells: &ShellSet,
-    trackers: &[ShellTracker],
+    motions: &[Option<Motion>],
     settings: &TrackerSettings,
-    turn: usize,
-    time_ns: u64,
-) -> Vec<Plan> {
-    let motions: Vec<Option<Motion>> =
-        trackers.iter().map(|tracker| tracker.motion_at(time_ns, settings)).collect();
-    let nothing_known = motions.iter().all(Option::is_none);
-    let palm_of = |name: &str| {
-        let palm = name.replace("thumb", "palm");
-        (palm != name).then(|| shells.shell_index(&palm)).flatten()
-    };
-    let mut plans = Vec::with_capacity(rig.cameras.len());
-    for (c, camera) in rig.cameras.iter().enumerate() {
-        let my_turn = turn % rig.cameras.len() == c;
-        let mut regions = Vec::new();
-        let mut full_decimate = None;
-        for (shell, motion) in shells.shells.iter().zip(&motions) {
-            let palm = palm_of(&shell.name);
-            match (motion, palm) {
-                (Some(motion), _) => regions.extend(tags_region(camera, shell, motion, settings)),
-                (None, Some(palm)) => {
-                    if my_turn && let Some(palm) = &motions[palm] {
-                        regions.extend(thumb_region(camera, palm, settings));
-                    }
-                }
-                (None, None) => {
-                    if my_turn || nothing_known {
-                        full_decimate = Some(settings.full_decimate);
-                    }
-                }
-            }
+    my_turn: bool,
+) -> Vec<Region> {
+    let region = |(index, (shell, motion)): (usize, (&Shell, &Option<Motion>))| match motion {
+        Some(motion) => tags_region(camera, shell, motion, settings),
+        None if my_turn => {
+            let palm = motions.get(shells.palm_of(index)?)?.as_ref()?;
+            thumb_region(camera, palm, settings)
         }
-        plans.push(Plan { regions: merged(regions), full_decimate });
-    }
-    plans
+        None => None,
+    };
+    merged(shells.shells.iter().zip(motions).enumerate().filter_map(region).collect())
 }
 
 /// Round the tags of a shell that face the camera.

@@ -19,6 +19,11 @@ pub(super) struct ShellTracker {
 }
 
 impl ShellTracker {
+    /// The motion as of the last measurement.
+    pub fn motion(&self) -> Option<&Motion> {
+        self.motion.as_ref()
+    }
+
     /// The motion at an instant, if the last measurement is recent enough.
     pub fn motion_at(&self, time_ns: u64, settings: &TrackerSettings) -> Option<Motion> {
         let motion = self.motion.as_ref()?;

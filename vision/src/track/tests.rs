@@ -116,9 +116,9 @@ fn frames_that_cannot_be_used_are_named_and_the_rest_goes_on() {
     set.frames[1].pixels = Pixels::Gray(small);
     set.frames.push(Frame { camera: 99, ..set.frames[2].clone() });
     let update = sut.update(&set);
-    let problem = |camera: usize| update.cameras[camera].problem.clone().unwrap_or_default();
+    let problem = |camera: usize| update.camera(camera).expect("a frame").problem.clone().unwrap_or_default();
     assert!(problem(0).contains("cannot be decoded"), "{}", problem(0));
     assert!(problem(1).contains("640x480"), "{}", problem(1));
-    assert_eq!(update.cameras[2].problem, None);
+    assert_eq!(update.camera(2).expect("a frame").problem, None);
     assert_eq!(update.shells[0].verdict, Verdict::Tracked);
 }

@@ -1,10 +1,13 @@
 //! What the tracker says after each instant.
 
+use std::collections::HashMap;
+
 use nalgebra::{Isometry3, Matrix6, Point2, Vector3};
 
 use crate::camera::Camera;
 use crate::detect::{Detection, Rect};
-use crate::shells::Shell;
+use crate::shells::{Shell, ShellSet};
+use crate::source::mean_ns;
 
 /// How a pose came about. Ordered from good to bad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,10 +73,12 @@ pub struct SeenTag {
 }
 
 /// What one camera contributed.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CameraUpdate {
-    /// When its frame was exposed; `None` if it had none in this set.
-    pub capture_ns: Option<u64>,
+    /// Its index in the rig.
+    pub camera: usize,
+    /// When its frame was exposed.
+    pub capture_ns: u64,
     /// The tags in its image.
     pub tags: Vec<SeenTag>,
     /// The regions that were searched.
@@ -82,25 +87,95 @@ pub struct CameraUpdate {
     pub searched_whole: bool,
     /// How long decoding the image took.
     pub decode_ns: u64,
+    /// How long reading and searching took.
+    pub detect_ns: u64,
     /// Why its image could not be used.
     pub problem: Option<String>,
+}
+
+impl CameraUpdate {
+    /// A frame in which nothing was searched yet.
+    pub fn nothing(camera: usize, capture_ns: u64) -> Self {
+        Self {
+            camera,
+            capture_ns,
+            tags: Vec::new(),
+            searched: Vec::new(),
+            searched_whole: false,
+            decode_ns: 0,
+            detect_ns: 0,
+            problem: None,
+        }
+    }
+
+    /// A frame that cannot be used.
+    pub fn unusable(camera: usize, capture_ns: u64, problem: String) -> Self {
+        Self { problem: Some(problem), ..Self::nothing(camera, capture_ns) }
+    }
+
+    /// Adds what another search of the same frame found and this one did not.
+    pub fn add(&mut self, other: Self) {
+        let known: Vec<u32> = self.tags.iter().map(|seen| seen.detection.id).collect();
+        self.tags.extend(other.tags.into_iter().filter(|seen| !known.contains(&seen.detection.id)));
+        self.searched.extend(other.searched);
+        self.searched_whole |= other.searched_whole;
+        self.detect_ns += other.detect_ns;
+    }
 }
 
 /// The outcome of one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackUpdate {
-    /// The instant: when the frames were exposed.
+    /// The instant: the mean of the frames' capture times.
     pub time_ns: u64,
     /// In the order of the shells file.
     pub shells: Vec<ShellUpdate>,
-    /// In the order of the rig file.
+    /// Those that had a frame.
     pub cameras: Vec<CameraUpdate>,
-    /// Duration of decoding (the slowest camera), of detection, and of solving and filtering.
+    /// Duration of decoding (the slowest camera), of detection (likewise), and of solving and filtering.
     pub decode_ns: u64,
     /// See [`TrackUpdate::decode_ns`].
     pub detect_ns: u64,
     /// See [`TrackUpdate::decode_ns`].
     pub solve_ns: u64,
+}
+
+impl TrackUpdate {
+    /// What a camera of the rig contributed, if it had a frame.
+    pub fn camera(&self, index: usize) -> Option<&CameraUpdate> {
+        self.cameras.iter().find(|update| update.camera == index)
+    }
+}
+
+/// The mean capture time; 0 of nothing.
+pub(super) fn mean_time_ns(cameras: &[CameraUpdate]) -> u64 {
+    mean_ns(cameras.iter().map(|camera| camera.capture_ns))
+}
+
+/// Shell and tag index of each id.
+#[derive(Debug)]
+pub(super) struct TagOwners(HashMap<u32, (usize, usize)>);
+
+impl TagOwners {
+    pub fn new(shells: &ShellSet) -> Self {
+        let tags = shells.shells.iter().enumerate();
+        let tags =
+            tags.flat_map(|(s, shell)| shell.tags.iter().enumerate().map(move |(t, tag)| (tag.id, (s, t))));
+        Self(tags.collect())
+    }
+
+    pub fn ids(&self) -> Vec<u32> {
+        self.0.keys().copied().collect()
+    }
+
+    /// Names the shell of each detection.
+    pub fn assign(&self, found: Vec<Detection>) -> Vec<SeenTag> {
+        let seen = |detection: Detection| {
+            let &(shell, tag) = self.0.get(&detection.id)?;
+            Some(SeenTag { detection, shell, tag, used: false, reprojected_px: None })
+        };
+        found.into_iter().filter_map(seen).collect()
+    }
 }
 
 /// Fills in where a pose puts the corners of the tags that were found.
@@ -111,7 +186,8 @@ pub(super) fn reproject(
     cameras: &[Camera],
     updates: &mut [CameraUpdate],
 ) {
-    for (camera, update) in cameras.iter().zip(updates) {
+    for update in updates {
+        let Some(camera) = cameras.get(update.camera) else { continue };
         let camera_from_shell = camera.world_from_camera.inverse() * pose;
         for seen in update.tags.iter_mut().filter(|seen| seen.shell == shell_index) {
             let corners = shell.tags[seen.tag].corners();

@@ -98,8 +98,9 @@ impl Outcome {
     }
 
     fn compare_tags(&mut self, instant: &Instant, update: &TrackUpdate, tracker: &Tracker) {
-        let views = tracker.rig().cameras.iter().zip(&update.cameras).zip(&instant.sightings);
-        for ((camera, update), sightings) in views {
+        let views = tracker.rig().cameras.iter().enumerate().zip(&instant.sightings);
+        for ((index, camera), sightings) in views {
+            let Some(update) = update.camera(index) else { continue };
             for seen in update.tags.iter().filter(|seen| seen.used) {
                 let error_px = self.worst_corner_px(instant, camera, seen, tracker.shells());
                 self.false_accepted += usize::from(error_px > FALSE_TAG_PX);
