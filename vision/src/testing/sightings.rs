@@ -1,4 +1,4 @@
-//! Deterministic random numbers, and what cameras would report of a moving shell.
+//! What cameras would report of a moving shell, without images.
 
 use nalgebra::{Isometry3, Point2};
 
@@ -6,26 +6,7 @@ use crate::camera::Camera;
 use crate::detect::CornerCovariance;
 use crate::pose::Observation;
 use crate::shells::Shell;
-
-/// Deterministic numbers: a linear congruence, twelve uniforms a normal one.
-pub struct Noise(pub u64);
-
-impl Noise {
-    pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Of standard deviation 1.
-    pub fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-
-    /// A whole number below a limit.
-    pub fn below(&mut self, limit: usize) -> usize {
-        (self.uniform() * limit as f64) as usize
-    }
-}
+use crate::testing::Noise;
 
 /// What one camera reports of a shell that moves: the tags that face it by 60 degrees and less, each corner
 /// where the shell is when the corner's row is exposed.
