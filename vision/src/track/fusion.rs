@@ -219,3 +219,6 @@ impl Fusion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
