@@ -11,7 +11,7 @@ use std::hint::black_box;
 use locoman_protocol::clock::thread_cpu_ns;
 use locoman_vision::camera::{Camera, Distortion};
 use locoman_vision::detect::CornerCovariance;
-use locoman_vision::pose::{Observation, Prior, Solver, SolverSettings, State, Vector12, Views};
+use locoman_vision::pose::{Observation, Prior, Solver, SolverSettings, State, Vector18, Views};
 use locoman_vision::shells::{Shell, design};
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
@@ -62,8 +62,9 @@ fn time(
     truth: &Isometry3<f64>,
 ) {
     let views = Views { shell, cameras, observations, time_ns: 0, variance: 1.0 };
-    let step = Vector12::from_iterator([1e-3, -1e-3, 1e-3, 0.02, -0.01, 0.02].into_iter().chain([0.0; 6]));
-    let mut prior = Prior::of_speed(State::still(*truth).moved(&step).world_from_shell, 0.1, 0.5);
+    let step = Vector18::from_iterator([1e-3, -1e-3, 1e-3, 0.02, -0.01, 0.02].into_iter().chain([0.0; 12]));
+    let known = SolverSettings { free_speed_m_s: 0.1, free_rate_rad_s: 0.5, ..SolverSettings::default() };
+    let mut prior = Prior::free(State::still(*truth).moved(&step).world_from_shell, &known);
     for k in 0..3 {
         prior.information[(k, k)] = 2e-3_f64.powi(-2);
         prior.information[(3 + k, 3 + k)] = 0.03_f64.powi(-2);

@@ -8,7 +8,7 @@
 //!                               e: from the predicted state, Λ: its information
 //! ```
 //!
-//! over the twelve numbers of pose and twist, by iteratively reweighted Levenberg-Marquardt (Triggs et al.,
+//! over the eighteen numbers of pose, twist and accelerations, by iteratively reweighted Levenberg-Marquardt (Triggs et al.,
 //! "Bundle adjustment: a modern synthesis", 1999). The lens stands in the projection, so measurements stay as
 //! they were and keep their noise. Tags that do not fit (half covered, swapped, wrong id) are left out as a
 //! whole and named ([`Fate`]), and the rest is solved again. The covariance is the inverse of the information,
@@ -29,7 +29,7 @@ use crate::camera::Camera;
 use crate::detect::CornerCovariance;
 use crate::shells::Shell;
 use problem::{Minimum, Workspace};
-pub use state::{Matrix12, Prior, State, Vector12};
+pub use state::{Matrix18, Prior, State, Vector18};
 
 /// The corners of one tag in one view.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,14 +92,14 @@ pub enum Refusal {
 /// A solved state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// Pose and twist at the instant that was asked for.
+    /// Pose, twist and accelerations at the instant that was asked for.
     pub state: State,
     /// Covariance of the state's tangent, the prior taken into account.
-    pub covariance: Matrix12,
+    pub covariance: Matrix18,
     /// What the data alone say, as information about [`Solution::state`]'s tangent,
-    pub information: Matrix12,
+    pub information: Matrix18,
     /// and the gradient of half their cost there: the data pull towards `state − information⁻¹ gradient`.
-    pub gradient: Vector12,
+    pub gradient: Vector18,
     /// χ² of the tags that were used, for each degree of freedom: about 1 if the corners' covariances are true.
     pub excess: f64,
     /// Degrees of freedom behind [`Solution::excess`].
@@ -129,8 +129,12 @@ pub struct SolverSettings {
     pub ambiguity_cost: f64,
     /// Speed of a shell of which nothing is known, standard deviation per axis, m/s,
     pub free_speed_m_s: f64,
-    /// and its angular velocity, rad/s.
+    /// its angular velocity, rad/s,
     pub free_rate_rad_s: f64,
+    /// its acceleration, m/s²,
+    pub free_acceleration_m_s2: f64,
+    /// and its angular acceleration, rad/s².
+    pub free_angular_rad_s2: f64,
 }
 
 impl Default for SolverSettings {
@@ -144,6 +148,8 @@ impl Default for SolverSettings {
             ambiguity_cost: 25.0,
             free_speed_m_s: 1.0,
             free_rate_rad_s: 5.0,
+            free_acceleration_m_s2: 3.0,
+            free_angular_rad_s2: 30.0,
         }
     }
 }
@@ -175,11 +181,16 @@ impl Solver {
     }
 
     /// Says of what was just used that nothing came of it: its pose was not believed.
-    pub fn refuse(&mut self, views: &Views<'_>) {
-        self.work.fates.resize(views.observations.len(), Fate::Unsolved);
+    pub fn refuse(&mut self) {
         for fate in self.work.fates.iter_mut().filter(|fate| **fate == Fate::Used) {
             *fate = Fate::Unsolved;
         }
+    }
+
+    /// Says of observations that nobody tried to solve them.
+    pub fn leave(&mut self, views: &Views<'_>) {
+        self.work.fates.clear();
+        self.work.fates.resize(views.observations.len(), Fate::Unsolved);
     }
 
     /// Solves near a prediction. Where views alone are ambiguous the prediction decides, if it is sure enough.
@@ -211,24 +222,22 @@ impl Solver {
         let solution = self.conclude(views, &minimum, prior)?;
         if solution.cameras == 1 && solution.tags <= 2 {
             // Few tags in one view look alike from two sides. The mirrored pose must be clearly worse.
-            let fates = self.work.fates.clone();
-            if let Some(mirrored) = initial::mirrored(views, &fates, &minimum.state)
-                && let Some(rival) = self.work.refine(views, &mirrored, prior, settings)
-                && rivals(&minimum, &rival, settings)
-            {
+            let mirrored = initial::mirrored(views, &self.work.fates, &minimum.state);
+            std::mem::swap(&mut self.work.fates, &mut self.work.set_aside);
+            let rival = mirrored.and_then(|start| self.work.refine(views, &start, prior, settings));
+            std::mem::swap(&mut self.work.fates, &mut self.work.set_aside);
+            if rival.is_some_and(|rival| rivals(&minimum, &rival, settings)) {
                 return Err(Refusal::Ambiguous);
             }
-            self.work.fates = fates;
         }
         Ok(solution)
     }
 
     fn afresh_prepared(&mut self, views: &Views<'_>, settings: &SolverSettings) -> Result<Solution, Refusal> {
-        let prior_at = |pose| Prior::of_speed(pose, settings.free_speed_m_s, settings.free_rate_rad_s);
         let mut found: Vec<(Minimum, Solution, Vec<Fate>)> = Vec::new();
         let mut refusal = self.nothing();
         for start in self.hypotheses(views) {
-            let prior = prior_at(start);
+            let prior = Prior::free(start, settings);
             let Some(minimum) = self.work.refine(views, &prior.state, &prior, settings) else { continue };
             match self.conclude(views, &minimum, &prior) {
                 Ok(solution) => found.push((minimum, solution, self.work.fates.clone())),
@@ -270,10 +279,10 @@ impl Solver {
             return Err(Refusal::NothingAgrees);
         }
         let data = &minimum.normal.hessian;
-        let inverse = |information: Matrix12| information.cholesky().map(|factor| factor.inverse());
+        let inverse = |information: Matrix18| information.cholesky().map(|factor| factor.inverse());
         let mut covariance = inverse(data + prior.information).ok_or(Refusal::NothingAgrees)?;
         // The numbers that the data, not the prior, determine: the trace of the share of their information.
-        let determined = 12.0 - covariance.dot(&prior.information);
+        let determined = 18.0 - covariance.dot(&prior.information);
         let freedom = (8.0 * used as f64 - determined).max(1.0);
         let excess = self.work.chi2() / freedom;
         // By chance χ² exceeds its mean by three standard deviations once in several hundred solves.

@@ -160,7 +160,7 @@ fn solve(
     let mut solver = Solver::default();
     match (solver.afresh(&views, &settings), before) {
         (Err(Refusal::Ambiguous), Some(before)) => {
-            let mut prior = Prior::of_speed(before.state.world_from_shell, 1.0, 5.0);
+            let mut prior = Prior::free(before.state.world_from_shell, &settings);
             for k in 0..3 {
                 prior.information[(k, k)] = MOVED_M.powi(-2);
                 prior.information[(3 + k, 3 + k)] = TURNED_RAD.powi(-2);

@@ -37,10 +37,11 @@ pub(super) fn mirrored(views: &Views<'_>, fates: &[Fate], state: &State) -> Opti
     let about_center = Translation3::from(center.coords) * turn * Translation3::from(-center.coords);
     // The rate in shell axes turns with the shell: in the world it stays as it was.
     let world_from_shell = about_center * pose;
-    let rate_in_world = pose.rotation * state.rate_rad_s;
+    let turned_back = world_from_shell.rotation.inverse() * pose.rotation;
     Some(State {
         world_from_shell,
-        rate_rad_s: world_from_shell.rotation.inverse() * rate_in_world,
+        rate_rad_s: turned_back * state.rate_rad_s,
+        angular_rad_s2: turned_back * state.angular_rad_s2,
         ..*state
     })
 }

@@ -5,9 +5,9 @@
 //! k grows with the lower median of s: while the start is far off, nothing fades; where sigma promises too
 //! much, everything is allowed more.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::state::{Matrix12, Prior, State, Vector12};
+use super::state::{Matrix18, Prior, State, Vector18};
 use super::term::{BEHIND, Linear, RESIDUAL, Term, View};
 use super::{Fate, Observation, SolverSettings, Views};
 
@@ -20,6 +20,8 @@ pub(super) struct Workspace {
     eyes: Vec<View>,
     pub terms: Vec<Option<Term>>,
     pub fates: Vec<Fate>,
+    /// Fates that wait while another start is tried.
+    pub set_aside: Vec<Fate>,
     here: Vec<Linear>,
     trial: Vec<Linear>,
     sorted: Vec<f64>,
@@ -27,8 +29,8 @@ pub(super) struct Workspace {
 
 /// Normal equations of the data at one state, without the prior.
 pub(super) struct Normal {
-    pub hessian: Matrix12,
-    pub gradient: Vector12,
+    pub hessian: Matrix18,
+    pub gradient: Vector18,
 }
 
 /// A minimum.
@@ -110,8 +112,8 @@ impl Workspace {
         const DOWN: f64 = 0.1;
         const UP: f64 = 8.0;
         const GIVE_UP: f64 = 1e8;
-        /// A step that promises to lower the cost by less is not worth it: a thousandth of a standard deviation.
-        const CONVERGED: f64 = 1e-6;
+        /// A step that promises to lower the cost by less is not worth it: a thirtieth of a standard deviation.
+        const CONVERGED: f64 = 1e-3;
         let mut state = *start;
         let mut damping = 0.0;
         Self::linearize(&self.terms, &self.eyes, views, &state, &mut self.here);
@@ -121,7 +123,7 @@ impl Workspace {
             let (prior_hessian, prior_gradient) = prior.linearized(&state);
             let gradient = normal.gradient + prior_gradient;
             let mut hessian = normal.hessian + prior_hessian;
-            for k in 0..12 {
+            for k in 0..18 {
                 hessian[(k, k)] *= 1.0 + damping;
             }
             let Some(cholesky) = hessian.cholesky() else {
@@ -193,9 +195,9 @@ impl Workspace {
 
     /// Σ w JᵀJ and Σ w Jᵀr of what counts, with the kernel's weights w.
     ///
-    /// From the products of six columns, times 1 for the pose, dt for the mixed part and dt² for the twist.
+    /// From the products of six columns, times dt to the power that position, velocity and acceleration have.
     fn normal(&self, state: &State, limit: f64) -> Normal {
-        let mut sums = [[[0.0; 8]; 8]; 3];
+        let mut sums = [[[0.0; 8]; 8]; 5];
         for k in self.used() {
             let (Linear { products, squared, .. }, Some(term)) = (&self.here[k], &self.terms[k]) else {
                 continue;
@@ -203,36 +205,42 @@ impl Workspace {
             if *squared >= BEHIND {
                 continue;
             }
-            let weight = if *squared > limit { limit / squared } else { 1.0 };
-            let factors = [weight, weight * term.dt_s, weight * term.dt_s * term.dt_s];
-            for (sum, factor) in sums.iter_mut().zip(factors) {
+            let mut factor = if *squared > limit { limit / squared } else { 1.0 };
+            for sum in &mut sums {
                 for (sum, row) in sum.iter_mut().zip(products).take(RESIDUAL) {
                     for (sum, value) in sum.iter_mut().zip(row) {
                         *sum += factor * value;
                     }
                 }
+                factor *= term.dt_s;
             }
         }
         // From rotations about world axes to those about shell axes.
         let rotation = state.world_from_shell.rotation.to_rotation_matrix().into_inner();
-        let mut hessian = Matrix12::zeros();
-        let mut gradient = Vector12::zeros();
-        for (place, sum) in [(0, 0), (0, 6), (6, 6)].into_iter().zip(&sums) {
+        let mut hessian = Matrix18::zeros();
+        let mut gradient = Vector18::zeros();
+        /// The derivative by the k-th derivative of the pose is dt^k / k! times that by the pose.
+        const FACTORS: [f64; 3] = [1.0, 1.0, 0.5];
+        for (power, sum) in sums.iter().enumerate() {
             let block = |i: usize, j: usize| Matrix3::from_fn(|r, c| sum[3 * i + r][3 * j + c]);
-            let mut put = |i: usize, j: usize, value: Matrix3<f64>| {
-                hessian.fixed_view_mut::<3, 3>(place.0 + 3 * i, place.1 + 3 * j).copy_from(&value);
-            };
-            let mixed = block(0, 1) * rotation;
-            put(0, 0, block(0, 0));
-            put(0, 1, mixed);
-            put(1, 0, mixed.transpose());
-            put(1, 1, rotation.tr_mul(&(block(1, 1) * rotation)));
+            let (linear, mixed) = (block(0, 0), block(0, 1) * rotation);
+            let angular = rotation.tr_mul(&(block(1, 1) * rotation));
+            for m in power.saturating_sub(2)..=power.min(2) {
+                let n = power - m;
+                let factor = FACTORS[m] * FACTORS[n];
+                let mut put = |i: usize, j: usize, value: Matrix3<f64>| {
+                    hessian.fixed_view_mut::<3, 3>(6 * m + 3 * i, 6 * n + 3 * j).copy_from(&(value * factor));
+                };
+                put(0, 0, linear);
+                put(0, 1, mixed);
+                put(1, 0, mixed.transpose());
+                put(1, 1, angular);
+            }
         }
-        hessian.fill_lower_triangle_with_upper_triangle();
-        for (first, sum) in [0, 6].into_iter().zip(&sums) {
-            let part = |i: usize| nalgebra::Vector3::from_fn(|r, _| sum[3 * i + r][RESIDUAL]);
-            gradient.fixed_rows_mut::<3>(first).copy_from(&part(0));
-            gradient.fixed_rows_mut::<3>(first + 3).copy_from(&rotation.tr_mul(&part(1)));
+        for (power, factor) in FACTORS.into_iter().enumerate() {
+            let part = |i: usize| Vector3::from_fn(|r, _| factor * sums[power][3 * i + r][RESIDUAL]);
+            gradient.fixed_rows_mut::<3>(6 * power).copy_from(&part(0));
+            gradient.fixed_rows_mut::<3>(6 * power + 3).copy_from(&rotation.tr_mul(&part(1)));
         }
         Normal { hessian, gradient }
     }

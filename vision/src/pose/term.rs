@@ -4,20 +4,21 @@
 //! A corner X (shell frame) that camera c, with pose (R_c, t_c), exposed dt after the reference time:
 //!
 //! ```text
-//! y = R exp(ω dt) X      r = π(R_cᵀ (y + p + v dt − t_c)) − z        π: projection with the lens
-//! B = ∂π/∂x_c R_cᵀ       ∂r/∂p = B    ∂r/∂φ = −B [y]×    ∂r/∂v = dt B    ∂r/∂(Rω) = −dt B [y]×
+//! y = R exp(ω dt + α dt²/2) X    r = π(R_cᵀ (y + p + v dt + a dt²/2 − t_c)) − z    π: projection with the lens
+//! B = ∂π/∂x_c R_cᵀ               ∂r/∂p = B          ∂r/∂v = dt B              ∂r/∂a = dt²/2 B
+//!                                ∂r/∂φ = −B [y]×    ∂r/∂(Rω) = −dt B [y]×    ∂r/∂(Rα) = −dt²/2 B [y]×
 //! ```
 //!
 //! φ is a rotation about world axes: [`super::problem`] turns the sums into shell axes. Two small things are left
 //! out of the derivatives, not of the residuals, where they would move the estimate by thousandths of its
 //! standard deviation: that a tag's corners differ by a millisecond in dt, and the left Jacobian of SO(3) in the
-//! last derivative (ω dt is some hundredths). So all twelve columns follow from six, and what a tag gives to the
-//! normal equations from the 7x7 products of (∂r/∂p, ∂r/∂φ, r), times 1, dt and dt².
+//! derivatives by ω and α (ω dt is some hundredths). So all eighteen columns follow from six, and what a tag gives to
+//! the normal equations from the 7x7 products of (∂r/∂p, ∂r/∂φ, r), times powers of dt.
 //!
 //! The residuals of a tag are multiplied with L⁻¹, where L Lᵀ is the covariance of its corners plus the floor:
 //! what calibration and print leave.
 
-use nalgebra::{Matrix3, Point2, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use super::state::State;
 use super::{Observation, Views};
@@ -106,12 +107,11 @@ impl Term {
 
     fn try_linearize(&self, views: &Views<'_>, eyes: &[View], state: &State) -> Option<Linear> {
         let (camera, eye) = (views.cameras.get(self.camera)?, eyes.get(self.camera)?);
-        let start = &state.world_from_shell;
-        let turn = UnitQuaternion::from_scaled_axis(state.rate_rad_s * self.dt_s);
-        let rotation = (start.rotation * turn).to_rotation_matrix().into_inner();
-        let position = start.translation.vector + state.velocity_m_s * self.dt_s;
-        let rate_in_world = start.rotation * state.rate_rad_s;
-        let from_eye = position - eye.eye;
+        let rotation = state.rotation_after(self.dt_s).to_rotation_matrix().into_inner();
+        let from_eye = state.position_after(self.dt_s) - eye.eye;
+        let velocity = state.velocity_m_s + state.acceleration_m_s2 * self.dt_s;
+        let rate = state.rate_rad_s + state.angular_rad_s2 * self.dt_s;
+        let rate_in_world = state.world_from_shell.rotation * rate;
         let mut rows = [[0.0; 8]; 8];
         let mut squared_px2 = 0.0;
         let mut first = Vector3::zeros();
@@ -121,7 +121,7 @@ impl Term {
             let later_s = self.later_s[c];
             let turning = rate_in_world.cross(&at_mean);
             let bending = rate_in_world.cross(&turning) * (0.5 * later_s);
-            let shift = (state.velocity_m_s + turning + bending) * later_s;
+            let shift = (velocity + turning + bending) * later_s;
             let in_camera = eye.camera_from_world * (at_mean + from_eye + shift);
             let (pixel, by_point) = camera.project_with_jacobian(&Point3::from(in_camera))?;
             let by_position = by_point * eye.camera_from_world;

@@ -47,8 +47,8 @@ fn error_m_rad(solution: &Solution, truth: &Isometry3<f64>) -> (f64, f64) {
 }
 
 fn perturbed(pose: &Isometry3<f64>, shift: [f64; 3], turn: [f64; 3]) -> Isometry3<f64> {
-    let step = shift.into_iter().chain(turn).chain([0.0; 6]);
-    State::still(*pose).moved(&Vector12::from_iterator(step)).world_from_shell
+    let step = shift.into_iter().chain(turn).chain([0.0; 12]);
+    State::still(*pose).moved(&Vector18::from_iterator(step)).world_from_shell
 }
 
 proptest! {

@@ -14,13 +14,11 @@
 //! σ follows the data: what was measured is compared with what was predicted, and a hand that moves more (or
 //! less) wildly than thought changes σ² within bounds, for translation and rotation apart.
 //!
-//! A solve gives information about pose and twist; acceleration learns from it through its correlation.
+//! A solve gives information about the same eighteen numbers, the prior taken out: the two are added.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
-use crate::pose::{Matrix12, Prior, Solution, State, Vector12};
-
-type Matrix18 = SMatrix<f64, 18, 18>;
+use crate::pose::{Matrix18, Prior, Solution, State, Vector18};
 
 /// How an acceleration behaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +38,8 @@ pub struct FilterSettings {
     pub angular: Manoeuvre,
     /// Bounds of the factor by which the data may change the squares of these standard deviations.
     pub variance_bounds: (f64, f64),
-    /// Squared Mahalanobis distance of pose and twist beyond which a measurement is taken for a jump. For twelve
-    /// degrees of freedom 60 is exceeded by chance once in forty million.
+    /// Squared Mahalanobis distance of the state beyond which a measurement is taken for a jump. For eighteen
+    /// degrees of freedom 75 is exceeded by chance once in a hundred million.
     pub gate: f64,
 }
 
@@ -51,7 +49,7 @@ impl Default for FilterSettings {
             linear: Manoeuvre { sigma: 3.0, time_s: 0.25 },
             angular: Manoeuvre { sigma: 30.0, time_s: 0.25 },
             variance_bounds: (1e-3, 30.0),
-            gate: 60.0,
+            gate: 75.0,
         }
     }
 }
@@ -76,15 +74,15 @@ pub struct Motion {
     covariance: Matrix18,
 }
 
-/// What a solve says of pose and twist at one instant, apart from what was believed before: a normal
+/// What a solve says of a state at one instant, apart from what was believed before: a normal
 /// distribution about a point, up to a factor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// The instant.
     pub time_ns: u64,
     about: State,
-    information: Matrix12,
-    gradient: Vector12,
+    information: Matrix18,
+    gradient: Vector18,
 }
 
 impl Evidence {
@@ -110,32 +108,32 @@ pub enum Judgement {
 
 impl Motion {
     /// Begins with a measured state.
-    pub fn begin(time_ns: u64, state: &State, covariance: &Matrix12, settings: &FilterSettings) -> Self {
-        let mut full = Matrix18::zeros();
-        full.fixed_view_mut::<12, 12>(0, 0).copy_from(covariance);
-        for k in 0..3 {
-            full[(12 + k, 12 + k)] = settings.linear.sigma.powi(2);
-            full[(15 + k, 15 + k)] = settings.angular.sigma.powi(2);
-        }
-        let State { world_from_shell, velocity_m_s, rate_rad_s } = *state;
+    pub fn begin(time_ns: u64, state: &State, covariance: &Matrix18) -> Self {
+        Self::of(time_ns, state, [1.0; 2], *covariance)
+    }
+
+    fn of(time_ns: u64, state: &State, variance: [f64; 2], covariance: Matrix18) -> Self {
+        let State { world_from_shell, velocity_m_s, rate_rad_s, acceleration_m_s2, angular_rad_s2 } = *state;
         Self {
             time_ns,
             world_from_shell,
             velocity_m_s,
             rate_rad_s,
-            acceleration_m_s2: Vector3::zeros(),
-            angular_rad_s2: Vector3::zeros(),
-            variance: [1.0; 2],
-            covariance: full,
+            acceleration_m_s2,
+            angular_rad_s2,
+            variance,
+            covariance,
         }
     }
 
-    /// Pose and twist.
+    /// Pose, twist and accelerations.
     pub fn state(&self) -> State {
         State {
             world_from_shell: self.world_from_shell,
             velocity_m_s: self.velocity_m_s,
             rate_rad_s: self.rate_rad_s,
+            acceleration_m_s2: self.acceleration_m_s2,
+            angular_rad_s2: self.angular_rad_s2,
         }
     }
 
@@ -144,14 +142,14 @@ impl Motion {
         self.covariance.fixed_view::<6, 6>(0, 0).into()
     }
 
-    /// Covariance of pose and twist, in the order of [`State::moved`].
-    pub fn state_covariance(&self) -> Matrix12 {
-        self.covariance.fixed_view::<12, 12>(0, 0).into()
+    /// Covariance of the state, in the order of [`State::moved`].
+    pub fn state_covariance(&self) -> &Matrix18 {
+        &self.covariance
     }
 
     /// What is believed, for a solve at this instant; `None` if the numbers have come to their end.
     pub fn prior(&self) -> Option<Prior> {
-        let information = self.state_covariance().cholesky()?.inverse();
+        let information = self.covariance.cholesky()?.inverse();
         Some(Prior { state: self.state(), information })
     }
 
@@ -166,12 +164,15 @@ impl Motion {
         let linear = Reach::new(dt_s, settings.linear.time_s);
         let angular = Reach::new(dt_s, settings.angular.time_s);
         let turn = self.rate_rad_s * dt_s + self.angular_rad_s2 * angular.position;
-        let mut step = Vector12::zeros();
-        step.fixed_rows_mut::<3>(0)
-            .copy_from(&(self.velocity_m_s * dt_s + self.acceleration_m_s2 * linear.position));
-        step.fixed_rows_mut::<3>(3).copy_from(&turn);
-        step.fixed_rows_mut::<3>(6).copy_from(&(self.acceleration_m_s2 * linear.velocity));
-        step.fixed_rows_mut::<3>(9).copy_from(&(self.angular_rad_s2 * angular.velocity));
+        let parts = [
+            self.velocity_m_s * dt_s + self.acceleration_m_s2 * linear.position,
+            turn,
+            self.acceleration_m_s2 * linear.velocity,
+            self.angular_rad_s2 * angular.velocity,
+            self.acceleration_m_s2 * (linear.fade - 1.0),
+            self.angular_rad_s2 * (angular.fade - 1.0),
+        ];
+        let step = Vector18::from_fn(|row, _| parts[row / 3][row % 3]);
 
         let mut transition = Matrix18::identity();
         let mut block = |row, column, value: Matrix3<f64>| {
@@ -197,17 +198,8 @@ impl Motion {
                 }
             }
         }
-        let State { world_from_shell, velocity_m_s, rate_rad_s } = self.state().moved(&step);
-        Self {
-            time_ns,
-            world_from_shell,
-            velocity_m_s,
-            rate_rad_s,
-            acceleration_m_s2: self.acceleration_m_s2 * linear.fade,
-            angular_rad_s2: self.angular_rad_s2 * angular.fade,
-            variance: self.variance,
-            covariance: (covariance + covariance.transpose()) * 0.5,
-        }
+        let covariance = (covariance + covariance.transpose()) * 0.5;
+        Self::of(time_ns, &self.state().moved(&step), self.variance, covariance)
     }
 
     /// Takes in what a solve says of this instant: call [`Motion::predicted`] first.
@@ -215,8 +207,7 @@ impl Motion {
     /// With Λ the information of the prior and e the step from its mean to the evidence's point, the joint
     /// minimum lies at δ = −(Λ + H)⁻¹ (Λ e + g) from there.
     pub fn correct(&mut self, evidence: &Evidence, settings: &FilterSettings) -> Judgement {
-        let before = self.state_covariance();
-        let Some(information) = before.cholesky().map(|factor| factor.inverse()) else {
+        let Some(information) = self.covariance.cholesky().map(|factor| factor.inverse()) else {
             return Judgement::Jump;
         };
         let Some(joint) = (information + evidence.information).cholesky() else { return Judgement::Jump };
@@ -227,37 +218,15 @@ impl Motion {
         if step.dot(&(information * step)) > settings.gate {
             return Judgement::Jump;
         }
-        let after: Matrix12 = joint.inverse();
-        self.learn(&before, &after, &step, settings);
-        State {
-            world_from_shell: self.world_from_shell,
-            velocity_m_s: self.velocity_m_s,
-            rate_rad_s: self.rate_rad_s,
-        } = state;
-        self.condition(&information, &after, &step);
+        let covariance = joint.inverse();
+        let variance = self.learned(&covariance, &step, settings);
+        *self = Self::of(self.time_ns, &state, variance, (covariance + covariance.transpose()) * 0.5);
         Judgement::Accepted
-    }
-
-    /// Acceleration and covariance, after pose and twist took a step and have a new covariance.
-    fn condition(&mut self, information: &Matrix12, after: &Matrix12, step: &Vector12) {
-        let cross: SMatrix<f64, 6, 12> = self.covariance.fixed_view::<6, 12>(12, 0).into();
-        let own: Matrix6<f64> = self.covariance.fixed_view::<6, 6>(12, 12).into();
-        let gain = cross * information;
-        let change = gain * step;
-        self.acceleration_m_s2 += change.fixed_rows::<3>(0);
-        self.angular_rad_s2 += change.fixed_rows::<3>(3);
-        let crossed = gain * after;
-        // P − G (P₁₁ − P₁₁') Gᵀ.
-        let own = own - gain * cross.transpose() + crossed * gain.transpose();
-        self.covariance.fixed_view_mut::<12, 12>(0, 0).copy_from(after);
-        self.covariance.fixed_view_mut::<6, 12>(12, 0).copy_from(&crossed);
-        self.covariance.fixed_view_mut::<12, 6>(0, 12).copy_from(&crossed.transpose());
-        self.covariance.fixed_view_mut::<6, 6>(12, 12).copy_from(&((own + own.transpose()) * 0.5));
     }
 
     /// Compares the correction of position and velocity (and of rotation and rate) with what was expected: the
     /// mean of dᵀ P⁻¹ d is the number of degrees of freedom that the data determine, tr(I − P⁻¹ P').
-    fn learn(&mut self, before: &Matrix12, after: &Matrix12, step: &Vector12, settings: &FilterSettings) {
+    fn learned(&self, after: &Matrix18, step: &Vector18, settings: &FilterSettings) -> [f64; 2] {
         /// With fewer degrees of freedom a ratio says nothing.
         const LEAST: f64 = 1.0;
         /// What one measurement changes in the logarithm of the variance, for each degree of freedom, and the
@@ -265,11 +234,12 @@ impl Motion {
         const GAIN: f64 = 0.05;
         const MOST: f64 = 6.0;
         let (low, high) = settings.variance_bounds;
-        for (offset, variance) in [0, 3].into_iter().zip(&mut self.variance) {
+        let mut variances = self.variance;
+        for (offset, variance) in [0, 3].into_iter().zip(&mut variances) {
             let index = |k: usize| offset + if k < 3 { k } else { k + 3 };
-            let part = |of: &Matrix12| Matrix6::from_fn(|i, j| of[(index(i), index(j))]);
+            let part = |of: &Matrix18| Matrix6::from_fn(|i, j| of[(index(i), index(j))]);
             let d = nalgebra::Vector6::from_fn(|k, _| step[index(k)]);
-            let Some(factor) = part(before).cholesky() else { continue };
+            let Some(factor) = part(&self.covariance).cholesky() else { continue };
             let freedom = 6.0 - factor.solve(&part(after)).trace();
             if freedom < LEAST {
                 continue;
@@ -278,6 +248,7 @@ impl Motion {
             let change = GAIN * freedom * (ratio.min(MOST) - 1.0);
             *variance = (*variance * change.exp()).clamp(low, high);
         }
+        variances
     }
 }
 

@@ -8,7 +8,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use super::filter::{FilterSettings, Motion};
-use crate::pose::{Matrix12, State};
+use crate::pose::{Matrix18, State};
 
 /// What is known of a thumb on its palm.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,7 @@ impl Hinge {
         if self.seen < LEAST {
             return None;
         }
-        let State { world_from_shell: world_from_palm, velocity_m_s, rate_rad_s } = palm.state();
+        let State { world_from_shell: world_from_palm, velocity_m_s, rate_rad_s, .. } = palm.state();
         let arm: Vector3<f64> = self.palm_from_thumb.translation.vector;
         let turn = self.palm_from_thumb.rotation.inverse();
         let rotation: Matrix3<f64> = world_from_palm.rotation.to_rotation_matrix().into_inner();
@@ -77,19 +77,22 @@ impl Hinge {
         }
         let pose =
             of_palm * palm.pose_covariance() * of_palm.transpose() + of_hinge * own * of_hinge.transpose();
-        let mut covariance = Matrix12::zeros();
+        let mut covariance = Matrix18::zeros();
         covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&pose);
         let twist = palm.state_covariance().fixed_view::<6, 6>(6, 6).into_owned();
         for k in 0..3 {
             covariance[(6 + k, 6 + k)] = twist[(k, k)] + SPEED_M_S * SPEED_M_S;
             covariance[(9 + k, 9 + k)] = twist[(3 + k, 3 + k)] + RATE_RAD_S * RATE_RAD_S;
+            covariance[(12 + k, 12 + k)] = settings.linear.sigma.powi(2);
+            covariance[(15 + k, 15 + k)] = settings.angular.sigma.powi(2);
         }
         let state = State {
             world_from_shell: world_from_palm * self.palm_from_thumb,
             velocity_m_s: velocity_m_s + rotation * rate_rad_s.cross(&arm),
             rate_rad_s: turn * rate_rad_s,
+            ..State::still(world_from_palm)
         };
-        Some(Motion::begin(palm.time_ns, &state, &covariance, settings))
+        Some(Motion::begin(palm.time_ns, &state, &covariance))
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) struct ShellTracker {
     history: VecDeque<Measured>,
     /// What began where the motion could not have led to, and how often it was confirmed.
     rival: Option<(Motion, u32)>,
-    /// Variance of the corners in units of what their covariances say, at least 1.
+    /// Variance of the corners in units of what their covariances say, as the residuals show it.
     variance: f64,
 }
 
@@ -100,7 +100,7 @@ impl ShellTracker {
         let earlier = self.history.iter().rposition(|known| known.motion.time_ns <= views.time_ns);
         if earlier.is_none() && !self.history.is_empty() {
             // Older than all that is remembered.
-            self.solver.refuse(views);
+            self.solver.leave(views);
             return None;
         }
         let base = earlier.map(|index| self.history[index].motion.clone());
@@ -115,7 +115,7 @@ impl ShellTracker {
                 })
             }
             _ => {
-                self.begin(begun(views.time_ns, &solution, settings));
+                self.begin(begun(views.time_ns, &solution));
                 return Some(self.believed(&solution));
             }
         };
@@ -129,7 +129,7 @@ impl ShellTracker {
                 Some(self.believed(&solution))
             }
             None => {
-                self.solver.refuse(views);
+                self.solver.refuse();
                 None
             }
         }
@@ -154,7 +154,7 @@ impl ShellTracker {
         if fine(&solution) {
             return Some(solution);
         }
-        self.solver.refuse(views);
+        self.solver.refuse();
         None
     }
 
@@ -198,7 +198,7 @@ impl ShellTracker {
             let there = recent(&rival.loosened(&settings.filter), time_ns, settings)?;
             follow(&there, evidence, settings).map(|motion| (motion, times + 1))
         });
-        let (motion, times) = confirmed.unwrap_or_else(|| (begun(time_ns, solution, settings), 1));
+        let (motion, times) = confirmed.unwrap_or_else(|| (begun(time_ns, solution), 1));
         if times < settings.jumps_to_restart {
             self.rival = Some((motion, times));
             return false;
@@ -214,7 +214,7 @@ impl ShellTracker {
         const GAIN: f64 = 0.03;
         const MANY: f64 = 50.0;
         const MOST: f64 = 3.0;
-        const BOUNDS: (f64, f64) = (1.0, 400.0);
+        const BOUNDS: (f64, f64) = (0.5, 400.0);
         let share = solution.freedom / (solution.freedom + MANY);
         let change = GAIN * share * (solution.excess.min(MOST) - 1.0);
         self.variance = (self.variance * change.exp()).clamp(BOUNDS.0, BOUNDS.1);
@@ -233,6 +233,6 @@ fn follow(motion: &Motion, evidence: &Evidence, settings: &TrackerSettings) -> O
     (motion.correct(evidence, &settings.filter) == Judgement::Accepted).then_some(motion)
 }
 
-fn begun(time_ns: u64, solution: &Solution, settings: &TrackerSettings) -> Motion {
-    Motion::begin(time_ns, &solution.state, &solution.covariance, &settings.filter)
+fn begun(time_ns: u64, solution: &Solution) -> Motion {
+    Motion::begin(time_ns, &solution.state, &solution.covariance)
 }

@@ -4,7 +4,7 @@ use super::*;
 
 /// A prediction as a filter gives it: position to 3 mm, rotation to 3 degrees.
 fn prior(pose: &Isometry3<f64>) -> Prior {
-    let mut prior = Prior::of_speed(*pose, 1.0, 5.0);
+    let mut prior = Prior::free(*pose, &SolverSettings::default());
     for k in 0..3 {
         prior.information[(k, k)] = 0.003_f64.powi(-2);
         prior.information[(3 + k, 3 + k)] = 0.05_f64.powi(-2);

@@ -26,7 +26,7 @@ fn measured(shell: usize, sigma_px: f64, seed: u64) -> (f64, f64) {
         }
         let views =
             Views { shell, cameras: &cameras, observations: &observations, time_ns: 0, variance: 1.0 };
-        let prior = Prior::of_speed(truth, 1.0, 5.0);
+        let prior = Prior::free(truth, &SolverSettings::default());
         let solution = sut.near(&views, &prior, &floorless()).expect("solvable");
         let error = solution.state.step_to(&State::still(truth)).fixed_rows::<6>(0).into_owned();
         let covariance = solution.covariance.fixed_view::<6, 6>(0, 0).into_owned();

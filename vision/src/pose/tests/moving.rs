@@ -16,9 +16,9 @@ fn rolling() -> Vec<Camera> {
 
 fn moving(pose: &Isometry3<f64>) -> State {
     State {
-        world_from_shell: *pose,
         velocity_m_s: Vector3::from(VELOCITY_M_S),
         rate_rad_s: Vector3::from(RATE_RAD_S),
+        ..State::still(*pose)
     }
 }
 
@@ -50,7 +50,13 @@ fn exact_corners_of_unsynchronised_rolling_cameras_give_pose_and_twist_exactly()
         let time_ns = exposure_ns(&cameras, &observations).expect("seen");
         let views = Views { shell, cameras: &cameras, observations: &observations, time_ns, variance: 1.0 };
         // The twist has a prior: what little it pulls shows.
-        let settings = SolverSettings { free_speed_m_s: 1e3, free_rate_rad_s: 1e3, ..exact() };
+        let settings = SolverSettings {
+            free_speed_m_s: 1e3,
+            free_rate_rad_s: 1e3,
+            free_acceleration_m_s2: 1e-3,
+            free_angular_rad_s2: 1e-3,
+            ..exact()
+        };
         let solution = Solver::default().afresh(&views, &settings).expect("solvable");
         let expected = truth.pose_after((time_ns as f64 - 1e9) * 1e-9);
         let (position_m, rotation_rad) = error_m_rad(&solution, &expected);
@@ -92,20 +98,31 @@ fn the_covariance_of_a_moving_shell_is_true() {
     let mut sut = Solver::default();
     let mut sum = 0.0;
     for _ in 0..RUNS {
-        // Motions are drawn from the prior, so that all twelve numbers count.
+        // Motions are drawn from the prior, so that all eighteen numbers count.
         let mut draw = |sigma: f64| Vector3::from_fn(|_, _| sigma * noise.normal());
-        let truth =
-            State { world_from_shell: testing::worn()[1], velocity_m_s: draw(1.0), rate_rad_s: draw(5.0) };
+        let truth = State {
+            world_from_shell: testing::worn()[1],
+            velocity_m_s: draw(1.0),
+            rate_rad_s: draw(5.0),
+            acceleration_m_s2: draw(3.0),
+            angular_rad_s2: draw(30.0),
+        };
         let observations = seen(shell, &cameras, &truth, 0.1, &mut noise);
         let time_ns = exposure_ns(&cameras, &observations).expect("seen");
         let views = Views { shell, cameras: &cameras, observations: &observations, time_ns, variance: 1.0 };
-        let expected = State { world_from_shell: truth.pose_after((time_ns as f64 - 1e9) * 1e-9), ..truth };
-        let prior = Prior::of_speed(expected.world_from_shell, 1.0, 5.0);
+        let dt_s = (time_ns as f64 - 1e9) * 1e-9;
+        let expected = State {
+            world_from_shell: truth.pose_after(dt_s),
+            velocity_m_s: truth.velocity_m_s + truth.acceleration_m_s2 * dt_s,
+            rate_rad_s: truth.rate_rad_s + truth.angular_rad_s2 * dt_s,
+            ..truth
+        };
+        let prior = Prior::free(expected.world_from_shell, &SolverSettings::default());
         let solution = sut.near(&views, &prior, &floorless()).expect("solvable");
         let error = solution.state.step_to(&expected);
-        sum += error.dot(&(solution.covariance.try_inverse().expect("regular") * error)) / 12.0;
+        sum += error.dot(&(solution.covariance.try_inverse().expect("regular") * error)) / 18.0;
     }
     let nees = sum / RUNS as f64;
-    println!("NEES of twelve numbers: {nees:.3}");
+    println!("NEES of eighteen numbers: {nees:.3}");
     assert!((0.8..=1.25).contains(&nees), "{nees}");
 }

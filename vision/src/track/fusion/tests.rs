@@ -36,24 +36,23 @@ fn settings() -> TrackerSettings {
     settings
 }
 
-/// All shells wave about where they are worn: 0.5 m/s and 90 degrees a second.
+/// All shells wave about where they are worn, at up to 1 m/s and 360 degrees a second.
 fn pose_at(shell: usize, t_s: f64) -> Isometry3<f64> {
-    let shift = Vector3::new(0.05 * (3.0 * t_s).sin(), 0.1 * (5.0 * t_s).sin(), 0.06 * (4.0 * t_s).sin());
-    let turn = Isometry3::new(Vector3::zeros(), Vector3::new(0.1, 0.4 * (4.0 * t_s).sin(), 0.2 * t_s.cos()));
+    let shift = Vector3::new(0.05 * (3.0 * t_s).sin(), 0.14 * (7.0 * t_s).sin(), 0.06 * (4.0 * t_s).sin());
+    let turn = Isometry3::new(Vector3::zeros(), Vector3::new(0.1, 0.8 * (7.8 * t_s).sin(), 0.2 * t_s.cos()));
     Isometry3::from(shift) * testing::worn()[shell] * turn
 }
 
-/// What a camera reports of a shell.
+/// What a camera reports of a shell that moves so.
 fn seen(
     cameras: &[Camera],
     camera: usize,
-    shell: usize,
     described: &Shell,
     capture_ns: u64,
+    pose_at: &dyn Fn(f64) -> Isometry3<f64>,
     noise: &mut Noise,
 ) -> Vec<SeenTag> {
-    let pose = |t_s: f64| pose_at(shell, t_s);
-    let observations = testing::observe(described, cameras, camera, capture_ns, &pose, SIGMA_PX, noise);
+    let observations = testing::observe(described, cameras, camera, capture_ns, pose_at, SIGMA_PX, noise);
     let tag = |observation: Observation| {
         let detection = Detection {
             id: described.tags[observation.tag].id,
@@ -63,20 +62,33 @@ fn seen(
             decimate: 1.0,
             covariance_px2: Some(observation.covariance_px2),
         };
+        let shell = testing::shells().shell_index(&described.name).expect("known");
         SeenTag::new(detection, shell, observation.tag)
     };
     observations.into_iter().map(tag).collect()
 }
 
-/// What one camera reports of these shells at a step.
-fn frame(sut: &Fusion, camera: usize, step: u64, shells: &[usize], noise: &mut Noise) -> CameraUpdate {
+/// What one camera reports at a step of these shells, which move so.
+fn moving_frame(
+    sut: &Fusion,
+    camera: usize,
+    step: u64,
+    shells: &[usize],
+    pose_at: &dyn Fn(usize, f64) -> Isometry3<f64>,
+    noise: &mut Noise,
+) -> CameraUpdate {
     let capture_ns = capture_ns(camera, step);
     let mut update = CameraUpdate::nothing(camera, capture_ns);
     for &shell in shells {
-        let described = &sut.shells().shells[shell];
-        update.tags.extend(seen(&sut.rig().cameras, camera, shell, described, capture_ns, noise));
+        let (described, cameras) = (&sut.shells().shells[shell], &sut.rig().cameras);
+        update.tags.extend(seen(cameras, camera, described, capture_ns, &|t_s| pose_at(shell, t_s), noise));
     }
     update
+}
+
+/// What one camera reports of these shells at a step.
+fn frame(sut: &Fusion, camera: usize, step: u64, shells: &[usize], noise: &mut Noise) -> CameraUpdate {
+    moving_frame(sut, camera, step, shells, &pose_at, noise)
 }
 
 fn frames(sut: &Fusion, step: u64, shells: &[usize], noise: &mut Noise) -> Vec<CameraUpdate> {

