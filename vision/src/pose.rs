@@ -1,32 +1,35 @@
-//! The pose of one shell from all corners of its tags in all views, jointly.
+//! The pose and the motion of one shell from all corners of its tags in all views, jointly.
 //!
-//! # Equations
-//! Unknown: T = (p, R), the shell's pose in the world. Tangent δ = (δp, δθ): p ← p + δp in world axes,
-//! R ← R·exp(δθ) in shell axes. A corner X (shell frame) seen by camera c with pose (R_c, t_c) at pixel z:
+//! Cameras need not be exposed together, nor their rows: each corner is compared with the shell at the corner's
+//! own time ([`term`](self) has the equations, [`State`] the motion). Minimised is
 //!
 //! ```text
-//! r = (π(R_cᵀ (R X + p − t_c)) − z) / σ          π: projection with the lens distortion
-//! J = (1/σ) · ∂π/∂x_c · R_cᵀ · [ I₃   −R [X]× ]
+//! Σ ρ(|L⁻¹ r|²) + eᵀ Λ e        r: eight residuals of a tag, L Lᵀ: covariance of its corners
+//!                               e: from the predicted state, Λ: its information
 //! ```
 //!
-//! The lens stands in the projection, so measurements stay as they were and keep their noise. Minimised is
-//! Σ ρ(|r|²) with Cauchy's ρ(s) = k² ln(1 + s/k²), by iteratively reweighted Levenberg-Marquardt (Triggs et
-//! al., "Bundle adjustment: a modern synthesis", 1999). Tags that do not fit (half covered, swapped, wrong
-//! id) are left out as a whole, and the rest is solved again. Covariance: (Σ w JᵀJ)⁻¹, widened where the
-//! residuals are larger than σ says.
+//! over the twelve numbers of pose and twist, by iteratively reweighted Levenberg-Marquardt (Triggs et al.,
+//! "Bundle adjustment: a modern synthesis", 1999). The lens stands in the projection, so measurements stay as
+//! they were and keep their noise. Tags that do not fit (half covered, swapped, wrong id) are left out as a
+//! whole and named ([`Fate`]), and the rest is solved again. The covariance is the inverse of the information,
+//! the data's share widened where residuals are larger than chance makes them.
 //!
-//! A start comes from the prediction, or from OpenCV's planar PnP (IPPE) of single tags: each gives two
-//! poses, and the one that explains all views best wins. One tag in one view alone is two-fold ambiguous;
-//! it is solved only if the views tell the two apart or a prediction does.
+//! [`Solver::near`] starts from a prediction. [`Solver::afresh`] has none: a start comes from OpenCV's planar
+//! PnP (IPPE) of single tags: each gives two poses, and the one that explains all views best wins. Where the
+//! views do not tell two poses apart, neither is given ([`Refusal::Ambiguous`]).
 
 mod initial;
 mod problem;
+mod state;
+mod term;
 
-use nalgebra::{Isometry3, Matrix6, Point2};
+use nalgebra::{Isometry3, Point2};
 
 use crate::camera::Camera;
+use crate::detect::CornerCovariance;
 use crate::shells::Shell;
-use problem::Problem;
+use problem::{Minimum, Workspace};
+pub use state::{Matrix12, Prior, State, Vector12};
 
 /// The corners of one tag in one view.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,23 +38,74 @@ pub struct Observation {
     pub camera: usize,
     /// Index into the shell's tags.
     pub tag: usize,
+    /// When the camera's frame was exposed: see [`Camera::row_delay_s`].
+    pub capture_ns: u64,
     /// Corners in the order of [`crate::shells::ShellTag::corners`], pixel centres at integers.
     pub corners_px: [Point2<f64>; 4],
-    /// Standard deviation of a corner along each axis.
-    pub sigma_px: f64,
+    /// Their covariance, without the floor of [`SolverSettings::corner_floor_px`].
+    pub covariance_px2: CornerCovariance,
 }
 
-/// A solved pose.
+/// What is to be solved: all observations of one shell, about one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Views<'a> {
+    /// The shell.
+    pub shell: &'a Shell,
+    /// All cameras of the rig.
+    pub cameras: &'a [Camera],
+    /// What they saw of the shell.
+    pub observations: &'a [Observation],
+    /// The instant whose state is asked for; best [`exposure_ns`].
+    pub time_ns: u64,
+    /// Variance of the corners in units of what their covariances say; 1 if they are right.
+    pub variance: f64,
+}
+
+/// What became of an observation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// The pose rests on it.
+    Used,
+    /// Its corners do not fit the pose that the others give.
+    Outlier,
+    /// The pose would show its back to the camera.
+    FacingAway,
+    /// It fits two poses equally well.
+    Ambiguous,
+    /// It names no camera or tag, or has numbers that cannot be.
+    Unusable,
+    /// No pose was found, or the pose was not believed.
+    Unsolved,
+}
+
+/// Why there is no solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Nothing usable was seen.
+    NothingSeen,
+    /// Most of what was seen contradicts every pose that was tried.
+    NothingAgrees,
+    /// Two poses explain it equally well.
+    Ambiguous,
+}
+
+/// A solved state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// The shell's pose in the world.
-    pub world_from_shell: Isometry3<f64>,
-    /// Covariance of position (world axes, m²), then rotation (shell axes, rad²).
-    pub covariance: Matrix6<f64>,
+    /// Pose and twist at the instant that was asked for.
+    pub state: State,
+    /// Covariance of the state's tangent, the prior taken into account.
+    pub covariance: Matrix12,
+    /// What the data alone say, as information about [`Solution::state`]'s tangent,
+    pub information: Matrix12,
+    /// and the gradient of half their cost there: the data pull towards `state − information⁻¹ gradient`.
+    pub gradient: Vector12,
+    /// χ² of the tags that were used, for each degree of freedom: about 1 if the corners' covariances are true.
+    pub excess: f64,
+    /// Degrees of freedom behind [`Solution::excess`].
+    pub freedom: f64,
     /// Root mean square of the corners' residual lengths in pixels, outliers left out.
     pub rms_px: f64,
-    /// For each observation, whether it was used.
-    pub used: Vec<bool>,
     /// Different tags that were used.
     pub tags: usize,
     /// Different cameras that were used.
@@ -61,106 +115,215 @@ pub struct Solution {
 /// Limits of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
-    /// Scale k of Cauchy's kernel, in standard deviations of a corner.
-    pub kernel_sigmas: f64,
-    /// A tag whose corners' RMS exceeds this many standard deviations is left out,
-    pub outlier_sigmas: f64,
-    /// but not below this many pixels.
+    /// What calibration, print and lens leave in each corner: standard deviation per axis, pixels.
+    pub corner_floor_px: f64,
+    /// χ² of a tag (eight residuals) up to which it counts in full. 20 is exceeded by chance once in a hundred.
+    pub kernel_chi2: f64,
+    /// A tag whose χ² is larger is left out (60: by chance never),
+    pub outlier_chi2: f64,
+    /// but not if its corners' RMS is smaller than this, pixels: calibration may leave as much.
     pub outlier_floor_px: f64,
     /// Steps of Levenberg-Marquardt at most.
     pub max_steps: usize,
-    /// Two poses from one tag whose costs differ by less (in units of σ²) are not told apart by it.
+    /// Two poses whose costs differ by less are not told apart. 25: five standard deviations.
     pub ambiguity_cost: f64,
+    /// Speed of a shell of which nothing is known, standard deviation per axis, m/s,
+    pub free_speed_m_s: f64,
+    /// and its angular velocity, rad/s.
+    pub free_rate_rad_s: f64,
 }
 
 impl Default for SolverSettings {
     fn default() -> Self {
         Self {
-            kernel_sigmas: 3.0,
-            outlier_sigmas: 6.0,
+            corner_floor_px: 0.04,
+            kernel_chi2: 20.0,
+            outlier_chi2: 60.0,
             outlier_floor_px: 0.6,
-            max_steps: 20,
+            max_steps: 25,
             ambiguity_cost: 25.0,
+            free_speed_m_s: 1.0,
+            free_rate_rad_s: 5.0,
         }
     }
 }
 
-/// Solves the pose of a shell; `None` if nothing was seen, if nothing agrees, or if it is ambiguous.
-///
-/// `guess` is the predicted pose, if there is one.
-pub fn solve(
-    shell: &Shell,
-    cameras: &[Camera],
-    observations: &[Observation],
-    guess: Option<&Isometry3<f64>>,
-    settings: &SolverSettings,
-) -> Option<Solution> {
-    let problem = Problem::new(shell, cameras, observations, settings);
-    if problem.is_empty() {
-        return None;
+/// The mean time at which the corners were exposed, rounded to a nanosecond; `None` of nothing.
+pub fn exposure_ns(cameras: &[Camera], observations: &[Observation]) -> Option<u64> {
+    let first_ns = observations.first()?.capture_ns;
+    let mut sum_s = 0.0;
+    for observation in observations {
+        let delay_s = |y_px: f64| cameras.get(observation.camera).map_or(0.0, |c| c.row_delay_s(y_px));
+        let since_s = (i128::from(observation.capture_ns) - i128::from(first_ns)) as f64 * 1e-9;
+        let rows_s: f64 = observation.corners_px.iter().map(|corner| delay_s(corner.y)).sum();
+        sum_s += since_s + rows_s / 4.0;
     }
-    let everything = vec![true; observations.len()];
-    if let Some(guess) = guess
-        && let Some(solution) = from_start(&problem, guess, &everything)
-        && solution.explains_most()
-    {
-        return Some(solution);
+    let offset_ns = (sum_s / observations.len() as f64 * 1e9).round();
+    first_ns.checked_add_signed(offset_ns as i64)
+}
+
+/// Solves shells; keeps its memory, so that a solve near a prediction needs no new one.
+#[derive(Debug, Default)]
+pub struct Solver {
+    work: Workspace,
+}
+
+impl Solver {
+    /// What became of each observation of the last solve.
+    pub fn fates(&self) -> &[Fate] {
+        &self.work.fates
     }
-    let mut candidates: Vec<Solution> = initial::hypotheses(&problem)
-        .iter()
-        .filter_map(|start| from_start(&problem, start, &everything))
-        .filter(Solution::explains_most)
-        .collect();
-    candidates.sort_by(|a, b| {
-        let cost = |s: &Solution| problem.cost(&s.world_from_shell, &everything);
-        cost(a).total_cmp(&cost(b))
-    });
-    let best = candidates.first()?;
-    let rival = candidates.iter().skip(1).find(|other| is_rival(&problem, best, other));
-    match (rival, guess) {
-        (None, _) => Some(best.clone()),
-        (Some(rival), Some(guess)) => {
-            let turn = |s: &Solution| s.world_from_shell.rotation.angle_to(&guess.rotation);
-            Some(if turn(rival) < turn(best) { rival.clone() } else { best.clone() })
+
+    /// Says of what was just used that nothing came of it: its pose was not believed.
+    pub fn refuse(&mut self, views: &Views<'_>) {
+        self.work.fates.resize(views.observations.len(), Fate::Unsolved);
+        for fate in self.work.fates.iter_mut().filter(|fate| **fate == Fate::Used) {
+            *fate = Fate::Unsolved;
         }
-        (Some(_), None) => None,
+    }
+
+    /// Solves near a prediction. Where views alone are ambiguous the prediction decides, if it is sure enough.
+    pub fn near(
+        &mut self,
+        views: &Views<'_>,
+        prior: &Prior,
+        settings: &SolverSettings,
+    ) -> Result<Solution, Refusal> {
+        self.work.prepare(views, settings);
+        let outcome = self.near_prepared(views, prior, settings);
+        self.explained(outcome)
+    }
+
+    /// Solves without a prediction.
+    pub fn afresh(&mut self, views: &Views<'_>, settings: &SolverSettings) -> Result<Solution, Refusal> {
+        self.work.prepare(views, settings);
+        let outcome = self.afresh_prepared(views, settings);
+        self.explained(outcome)
+    }
+
+    fn near_prepared(
+        &mut self,
+        views: &Views<'_>,
+        prior: &Prior,
+        settings: &SolverSettings,
+    ) -> Result<Solution, Refusal> {
+        let minimum = self.work.refine(views, &prior.state, prior, settings).ok_or(Refusal::NothingSeen)?;
+        let solution = self.conclude(views, &minimum, prior)?;
+        if solution.cameras == 1 && solution.tags <= 2 {
+            // Few tags in one view look alike from two sides. The mirrored pose must be clearly worse.
+            let fates = self.work.fates.clone();
+            if let Some(mirrored) = initial::mirrored(views, &fates, &minimum.state)
+                && let Some(rival) = self.work.refine(views, &mirrored, prior, settings)
+                && rivals(&minimum, &rival, settings)
+            {
+                return Err(Refusal::Ambiguous);
+            }
+            self.work.fates = fates;
+        }
+        Ok(solution)
+    }
+
+    fn afresh_prepared(&mut self, views: &Views<'_>, settings: &SolverSettings) -> Result<Solution, Refusal> {
+        let prior_at = |pose| Prior::of_speed(pose, settings.free_speed_m_s, settings.free_rate_rad_s);
+        let mut found: Vec<(Minimum, Solution, Vec<Fate>)> = Vec::new();
+        let mut refusal = Refusal::NothingSeen;
+        for start in self.hypotheses(views) {
+            let prior = prior_at(start);
+            let Some(minimum) = self.work.refine(views, &prior.state, &prior, settings) else { continue };
+            match self.conclude(views, &minimum, &prior) {
+                Ok(solution) => found.push((minimum, solution, self.work.fates.clone())),
+                Err(reason) => refusal = reason,
+            }
+        }
+        found.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
+        let mut found = found.into_iter();
+        let (minimum, solution, fates) = found.next().ok_or(refusal)?;
+        if found.any(|(rival, ..)| rivals(&minimum, &rival, settings)) {
+            return Err(Refusal::Ambiguous);
+        }
+        self.work.fates = fates;
+        Ok(solution)
+    }
+
+    /// Start poses, the best first.
+    fn hypotheses(&mut self, views: &Views<'_>) -> Vec<Isometry3<f64>> {
+        /// Poses that are worth refining.
+        const KEPT: usize = 4;
+        let mut scored: Vec<(f64, Isometry3<f64>)> = initial::hypotheses(views)
+            .into_iter()
+            .map(|pose| (self.work.fit(views, &State::still(pose)), pose))
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored.into_iter().take(KEPT).map(|(_, pose)| pose).collect()
+    }
+
+    /// The solution at a minimum.
+    fn conclude(&self, views: &Views<'_>, minimum: &Minimum, prior: &Prior) -> Result<Solution, Refusal> {
+        let used = self.work.used_count();
+        // What two of five tags say is no pose.
+        if used == 0 || 2 * used < views.observations.len() {
+            return Err(Refusal::NothingAgrees);
+        }
+        let data = &minimum.normal.hessian;
+        let joint = (data + prior.information).cholesky().ok_or(Refusal::NothingAgrees)?;
+        // The numbers that the data, not the prior, determine: the trace of the share of their information.
+        let determined = joint.solve(data).trace();
+        let freedom = (8.0 * used as f64 - determined).max(1.0);
+        let excess = self.work.chi2() / freedom;
+        // By chance χ² exceeds its mean by three standard deviations once in several hundred solves.
+        let widening = (excess / (1.0 + 3.0 * (2.0 / freedom).sqrt())).max(1.0);
+        let information = data / widening;
+        let covariance =
+            (information + prior.information).cholesky().ok_or(Refusal::NothingAgrees)?.inverse();
+        if !covariance.iter().all(|number| number.is_finite()) {
+            return Err(Refusal::NothingAgrees);
+        }
+        let mut squares_px2 = 0.0;
+        for (term, fate) in self.work.terms.iter().zip(self.fates()) {
+            if let (Some(term), Fate::Used) = (term, fate) {
+                squares_px2 += term.squares_px2(views, &minimum.state).unwrap_or(f64::INFINITY);
+            }
+        }
+        Ok(Solution {
+            state: minimum.state,
+            covariance,
+            information,
+            gradient: minimum.normal.gradient / widening,
+            excess,
+            freedom,
+            rms_px: (squares_px2 / (4.0 * used as f64)).sqrt(),
+            tags: self.distinct(views, |observation| observation.tag),
+            cameras: self.distinct(views, |observation| observation.camera),
+        })
+    }
+
+    /// Different values of something among what was used.
+    fn distinct(&self, views: &Views<'_>, of: impl Fn(&Observation) -> usize) -> usize {
+        let used = |k: &usize| self.work.fates[*k] == Fate::Used;
+        let values = || (0..views.observations.len()).filter(used).map(|k| of(&views.observations[k]));
+        values().enumerate().filter(|(k, value)| !values().take(*k).any(|earlier| earlier == *value)).count()
+    }
+
+    /// Names what a refusal makes of the observations.
+    fn explained(&mut self, outcome: Result<Solution, Refusal>) -> Result<Solution, Refusal> {
+        let fate = match outcome {
+            Ok(_) => return outcome,
+            Err(Refusal::Ambiguous) => Fate::Ambiguous,
+            Err(_) => Fate::Unsolved,
+        };
+        for known in self.work.fates.iter_mut().filter(|known| **known == Fate::Used) {
+            *known = fate;
+        }
+        outcome
     }
 }
 
-/// Whether another pose explains the views nearly as well and is not the same.
-fn is_rival(problem: &Problem<'_>, best: &Solution, other: &Solution) -> bool {
+/// Whether another minimum is about as good and is not the same.
+fn rivals(best: &Minimum, other: &Minimum, settings: &SolverSettings) -> bool {
     /// Poses nearer to each other have the same minimum.
     const SAME_RAD: f64 = 0.02;
-    let everything = vec![true; best.used.len()];
-    let cost = |s: &Solution| problem.cost(&s.world_from_shell, &everything);
-    let apart = other.world_from_shell.rotation.angle_to(&best.world_from_shell.rotation);
-    apart > SAME_RAD && cost(other) - cost(best) < problem.settings.ambiguity_cost
-}
-
-/// Minimises from a start, leaves out what does not fit, minimises again.
-fn from_start(problem: &Problem<'_>, start: &Isometry3<f64>, everything: &[bool]) -> Option<Solution> {
-    /// Each round may uncover further outliers; more than this are not needed.
-    const ROUNDS: usize = 3;
-    let mut used = everything.to_vec();
-    let mut pose = problem.minimize(start, &used);
-    for _ in 0..ROUNDS {
-        let fits = problem.fitting(&pose);
-        let settled = fits == used;
-        used = fits;
-        if settled || !used.contains(&true) {
-            break;
-        }
-        pose = problem.minimize(&pose, &used);
-    }
-    problem.conclude(&pose, used)
-}
-
-impl Solution {
-    /// At least half of what was seen agrees: what two of five tags say is no pose.
-    fn explains_most(&self) -> bool {
-        let used = self.used.iter().filter(|used| **used).count();
-        2 * used >= self.used.len()
-    }
+    let rotation = |minimum: &Minimum| minimum.state.world_from_shell.rotation;
+    rotation(other).angle_to(&rotation(best)) > SAME_RAD && other.cost - best.cost < settings.ambiguity_cost
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! What the tests of this crate share: a rig, poses as they are worn, and a plain renderer.
 
+mod sightings;
+
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
 use crate::camera::{Camera, Distortion};
@@ -7,6 +9,7 @@ use crate::detect::tag_bitmap;
 use crate::image::GrayImage;
 use crate::rig::Rig;
 use crate::shells::{ShellSet, design};
+pub use sightings::observe;
 
 /// Two stereo pairs of 1280x720 pixels in front of the operator, with barrel distortion.
 pub fn rig() -> Rig {

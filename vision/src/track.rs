@@ -15,9 +15,11 @@
 //! machines: what passes between them are plain values. Nothing depends on the wall clock but the reported
 //! durations: the same frames give the same poses.
 
+mod admission;
 mod eye;
 mod filter;
 mod fusion;
+mod hinge;
 mod plan;
 mod scout;
 mod settings;
@@ -31,8 +33,9 @@ use crate::image::Frame;
 use crate::rig::Rig;
 use crate::shells::ShellSet;
 use crate::source::FrameSet;
+pub use admission::Dropped;
 pub use eye::Eye;
-pub use filter::{FilterSettings, Motion};
+pub use filter::{FilterSettings, Manoeuvre, Motion};
 pub use fusion::{Fusion, Motions};
 pub use scout::Scout;
 pub use settings::TrackerSettings;

@@ -1,35 +1,48 @@
-//! First poses of a shell, from single tags by OpenCV's planar PnP.
+//! First poses of a shell, from single tags by OpenCV's planar PnP, and the mirrored twin of a pose.
 //!
 //! IPPE (Collins and Bartoli, "Infinitesimal plane-based pose estimation", 2014) gives both poses under
 //! which a square looks alike. Each tag speaks for the whole shell, so a wrong one cannot spoil the others.
 
-use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Translation3, Unit, UnitQuaternion, Vector3};
 use opencv::calib3d::{self, SolvePnPMethod};
 use opencv::core::{Mat, MatExprTraitConst, MatTraitConst, Point2d, Point3d, Vector};
 
-use super::problem::Problem;
+use super::state::State;
+use super::{Fate, Observation, Views};
 
 /// Tags that are asked, the largest first.
 const ASKED_TAGS: usize = 6;
-/// Poses that are worth refining, those that explain all views best first.
-const KEPT: usize = 4;
 
-/// Start poses, the best first.
-pub(super) fn hypotheses(problem: &Problem<'_>) -> Vec<Isometry3<f64>> {
-    let mut order: Vec<usize> = (0..problem.observations.len()).collect();
-    order.sort_by(|a, b| {
-        let area = |k: &usize| area_px2(&problem.observations[*k].corners_px);
-        area(b).total_cmp(&area(a))
-    });
-    let everything = vec![true; problem.observations.len()];
-    let mut scored: Vec<(f64, Isometry3<f64>)> = order
-        .iter()
-        .take(ASKED_TAGS)
-        .flat_map(|k| from_tag(problem, *k).unwrap_or_default())
-        .map(|pose| (problem.cost(&pose, &everything), pose))
-        .collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    scored.into_iter().take(KEPT).map(|(_, pose)| pose).collect()
+/// Start poses, in no order.
+pub(super) fn hypotheses(views: &Views<'_>) -> Vec<Isometry3<f64>> {
+    let mut order: Vec<&Observation> = views.observations.iter().collect();
+    order.sort_by(|a, b| area_px2(&b.corners_px).total_cmp(&area_px2(&a.corners_px)));
+    let poses = order.into_iter().take(ASKED_TAGS);
+    poses.flat_map(|observation| from_tag(views, observation).unwrap_or_default()).collect()
+}
+
+/// The state under which the largest tag that is used looks nearly the same: its normal reflected about the
+/// line of sight, its centre where it was. `None` if it faces the camera straight: then there is no other.
+pub(super) fn mirrored(views: &Views<'_>, fates: &[Fate], state: &State) -> Option<State> {
+    let used = views.observations.iter().zip(fates).filter(|(_, fate)| **fate == Fate::Used);
+    let largest = used.max_by(|a, b| area_px2(&a.0.corners_px).total_cmp(&area_px2(&b.0.corners_px)))?.0;
+    let tag = views.shell.tags.get(largest.tag)?;
+    let camera = views.cameras.get(largest.camera)?;
+    let pose = state.world_from_shell;
+    let center = pose * tag.center();
+    let sight = (camera.world_from_camera.translation.vector - center.coords).normalize();
+    let normal = pose * tag.normal();
+    let axis = Unit::try_new(normal.cross(&sight), 1e-6)?;
+    let turn = UnitQuaternion::from_axis_angle(&axis, 2.0 * normal.angle(&sight));
+    let about_center = Translation3::from(center.coords) * turn * Translation3::from(-center.coords);
+    // The rate in shell axes turns with the shell: in the world it stays as it was.
+    let world_from_shell = about_center * pose;
+    let rate_in_world = pose.rotation * state.rate_rad_s;
+    Some(State {
+        world_from_shell,
+        rate_rad_s: world_from_shell.rotation.inverse() * rate_in_world,
+        ..*state
+    })
 }
 
 /// Twice the area of a quadrilateral.
@@ -38,10 +51,9 @@ fn area_px2(corners: &[Point2<f64>; 4]) -> f64 {
 }
 
 /// The shell's poses that one tag in one view allows.
-fn from_tag(problem: &Problem<'_>, k: usize) -> opencv::Result<Vec<Isometry3<f64>>> {
-    let observation = &problem.observations[k];
-    let camera = &problem.cameras[observation.camera];
-    let tag = &problem.shell.tags[observation.tag];
+fn from_tag(views: &Views<'_>, observation: &Observation) -> opencv::Result<Vec<Isometry3<f64>>> {
+    let (camera, tag) = (views.cameras.get(observation.camera), views.shell.tags.get(observation.tag));
+    let (Some(camera), Some(tag)) = (camera, tag) else { return Ok(Vec::new()) };
     let half = tag.size_m / 2.0;
     let object: Vector<Point3d> = [(-half, -half), (half, -half), (half, half), (-half, half)]
         .into_iter()

@@ -1,217 +1,247 @@
-//! The least-squares problem of [`super`]: cost, normal equations, Levenberg-Marquardt, covariance.
+//! The least-squares problem of [`super`]: normal equations, Levenberg-Marquardt, which tags fit.
+//!
+//! Each tag counts with ρ(s) of its squared whitened residual s: ρ = s up to k, then k (1 + ln(s/k)), so that
+//! what is ordinary counts in full and keeps the covariance true, and what is not fades like Cauchy's kernel.
+//! k grows with the lower median of s: while the start is far off, nothing fades; where sigma promises too
+//! much, everything is allowed more.
 
-use std::collections::BTreeSet;
+use nalgebra::SVector;
 
-use nalgebra::{
-    Isometry3, Matrix2x3, Matrix2x6, Matrix6, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3,
-    Vector6,
-};
+use super::state::{Matrix12, Prior, State, Vector12};
+use super::term::{BEHIND, Linear, Term, View};
+use super::{Fate, Observation, SolverSettings, Views};
 
-use super::{Observation, Solution, SolverSettings};
-use crate::camera::Camera;
-use crate::shells::Shell;
+/// Median of χ² with eight degrees of freedom.
+const MEDIAN: f64 = 7.344;
 
-/// Squared residual, in σ², of a corner that a pose puts behind the camera.
-const BEHIND: f64 = 1e8;
-
-/// Observations together with what they are of.
-pub(super) struct Problem<'a> {
-    pub shell: &'a Shell,
-    pub cameras: &'a [Camera],
-    pub observations: &'a [Observation],
-    pub settings: &'a SolverSettings,
-    camera_from_world: Vec<Isometry3<f64>>,
-    /// Corners of each observation's tag in the shell frame.
-    corners: Vec<[Point3<f64>; 4]>,
+/// Memory that solves share, so that they need no new one.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    eyes: Vec<View>,
+    pub terms: Vec<Option<Term>>,
+    pub fates: Vec<Fate>,
+    here: Vec<Linear>,
+    trial: Vec<Linear>,
+    sorted: Vec<f64>,
 }
 
-/// Normal equations at one pose.
-struct Normal {
-    hessian: Matrix6<f64>,
-    gradient: Vector6<f64>,
-    cost: f64,
+/// Normal equations of the data at one state, without the prior.
+pub(super) struct Normal {
+    pub hessian: Matrix12,
+    pub gradient: Vector12,
 }
 
-impl<'a> Problem<'a> {
-    pub fn new(
-        shell: &'a Shell,
-        cameras: &'a [Camera],
-        observations: &'a [Observation],
-        settings: &'a SolverSettings,
-    ) -> Self {
-        let camera_from_world = cameras.iter().map(|c| c.world_from_camera.inverse()).collect();
-        let corners = observations.iter().map(|o| shell.tags[o.tag].corners()).collect();
-        Self { shell, cameras, observations, settings, camera_from_world, corners }
+/// A minimum.
+pub(super) struct Minimum {
+    pub state: State,
+    pub normal: Normal,
+    /// Σ ρ of the tags that count, and the prior's share.
+    pub cost: f64,
+}
+
+impl Workspace {
+    /// Prepares the observations; all of them count at first.
+    pub fn prepare(&mut self, views: &Views<'_>, settings: &SolverSettings) {
+        self.eyes.clear();
+        self.eyes.extend(views.cameras.iter().map(View::new));
+        self.terms.clear();
+        let term = |o: &Observation| Term::new(views, o, settings.corner_floor_px, views.variance);
+        self.terms.extend(views.observations.iter().map(term));
+        self.here.resize_with(self.terms.len(), Linear::new);
+        self.trial.resize_with(self.terms.len(), Linear::new);
+        self.include_all();
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.observations.is_empty()
+    /// All observations that make sense count again.
+    pub fn include_all(&mut self) {
+        self.fates.clear();
+        let fate = |term: &Option<Term>| if term.is_some() { Fate::Used } else { Fate::Unusable };
+        self.fates.extend(self.terms.iter().map(fate));
     }
 
-    /// Σ ρ(|r|²) of the observations that are used.
-    pub fn cost(&self, pose: &Isometry3<f64>, used: &[bool]) -> f64 {
-        let of_tag = |k: usize| self.residuals(pose, k).map(|r| self.kernel(squared(r))).iter().sum::<f64>();
-        (0..used.len()).filter(|k| used[*k]).map(of_tag).sum()
+    /// Which observations count, and their terms.
+    fn used(&self) -> impl Iterator<Item = usize> + '_ {
+        self.fates.iter().enumerate().filter(|(_, fate)| **fate == Fate::Used).map(|(k, _)| k)
     }
 
-    /// Which observations fit a pose.
-    pub fn fitting(&self, pose: &Isometry3<f64>) -> Vec<bool> {
-        let fits = |(k, observation): (usize, &Observation)| {
-            let mean = self.residuals(pose, k).map(squared).iter().sum::<f64>() / 4.0;
-            let rms_px = mean.sqrt() * observation.sigma_px;
-            let limit_px =
-                (self.settings.outlier_sigmas * observation.sigma_px).max(self.settings.outlier_floor_px);
-            rms_px < limit_px && self.faces(pose, observation)
-        };
-        self.observations.iter().enumerate().map(fits).collect()
+    pub fn used_count(&self) -> usize {
+        self.used().count()
     }
 
-    /// Whether the printed side of the tag looks at the camera.
-    fn faces(&self, pose: &Isometry3<f64>, observation: &Observation) -> bool {
-        let tag = &self.shell.tags[observation.tag];
-        let center = pose * tag.center();
-        let eye = self.cameras[observation.camera].world_from_camera.translation.vector;
-        (pose * tag.normal()).dot(&(eye - center.coords)) > 0.0
+    /// How well a state explains all observations: the smaller the better.
+    pub fn fit(&mut self, views: &Views<'_>, state: &State) -> f64 {
+        /// Poses from single tags lie some pixels beside the others': this tells near from far.
+        const LIMIT: f64 = 1e4;
+        Self::linearize(&self.terms, &self.eyes, views, state, &mut self.here);
+        self.here.iter().map(|linear| kernel(linear.squared, LIMIT)).sum()
     }
 
-    /// Levenberg-Marquardt from a start; never returns a pose of higher cost than the start's.
-    pub fn minimize(&self, start: &Isometry3<f64>, used: &[bool]) -> Isometry3<f64> {
-        /// Damping at the start, its factor after a good and after a bad step, and where to give up.
-        const START: f64 = 1e-4;
+    /// Minimises from a start, leaves out what does not fit, minimises again.
+    pub fn refine(
+        &mut self,
+        views: &Views<'_>,
+        start: &State,
+        prior: &Prior,
+        settings: &SolverSettings,
+    ) -> Option<Minimum> {
+        /// Each round may uncover further outliers; more than this are not needed.
+        const ROUNDS: usize = 4;
+        self.include_all();
+        let mut minimum = self.minimize(views, start, prior, settings)?;
+        for _ in 0..ROUNDS {
+            if !self.judge(views, &minimum.state, settings) {
+                break;
+            }
+            minimum = self.minimize(views, &minimum.state, prior, settings)?;
+        }
+        Some(minimum)
+    }
+
+    /// Levenberg-Marquardt from a start; `None` if nothing counts. [`Workspace::here`] is at the minimum then.
+    fn minimize(
+        &mut self,
+        views: &Views<'_>,
+        start: &State,
+        prior: &Prior,
+        settings: &SolverSettings,
+    ) -> Option<Minimum> {
+        /// Damping after the first bad step, its factors after good and bad steps, and where to give up.
+        const FIRST: f64 = 1e-4;
         const DOWN: f64 = 0.1;
         const UP: f64 = 8.0;
         const GIVE_UP: f64 = 1e8;
-        /// Steps below a nanometre and a nanoradian change nothing.
-        const CONVERGED: f64 = 1e-9;
-        let mut pose = *start;
-        let mut damping = START;
-        let mut normal = self.normal(&pose, used);
-        for _ in 0..self.settings.max_steps {
-            let mut damped = normal.hessian;
-            for k in 0..6 {
-                damped[(k, k)] *= 1.0 + damping;
+        /// A step that lowers the cost by less changes nothing: a ten-thousandth of a standard deviation.
+        const CONVERGED: f64 = 1e-8;
+        let mut state = *start;
+        let mut damping = 0.0;
+        Self::linearize(&self.terms, &self.eyes, views, &state, &mut self.here);
+        let mut limit = self.kernel_limit(settings)?;
+        let mut normal = self.normal(limit);
+        for _ in 0..settings.max_steps {
+            let (prior_hessian, prior_gradient) = prior.linearized(&state);
+            let gradient = normal.gradient + prior_gradient;
+            let mut hessian = normal.hessian + prior_hessian;
+            for k in 0..12 {
+                hessian[(k, k)] *= 1.0 + damping;
             }
-            let Some(cholesky) = damped.cholesky() else { break };
-            let step = -cholesky.solve(&normal.gradient);
-            let moved = perturb(&pose, &step);
-            let cost = self.cost(&moved, used);
-            if cost <= normal.cost {
-                pose = moved;
-                damping *= DOWN;
-                if step.amax() < CONVERGED {
+            let Some(cholesky) = hessian.cholesky() else {
+                // Singular without damping: four corners on a line, or numbers at their end.
+                damping = f64::max(damping * UP, FIRST);
+                if damping > GIVE_UP {
                     break;
                 }
-                normal = self.normal(&pose, used);
+                continue;
+            };
+            let step = -cholesky.solve(&gradient);
+            let moved = state.moved(&step);
+            Self::linearize(&self.terms, &self.eyes, views, &moved, &mut self.trial);
+            let before = self.cost(&self.here, limit) + prior.distance2(&state);
+            let after = self.cost(&self.trial, limit) + prior.distance2(&moved);
+            let promised = -step.dot(&gradient);
+            if after <= before {
+                state = moved;
+                std::mem::swap(&mut self.here, &mut self.trial);
+                damping = if damping > FIRST { damping * DOWN } else { 0.0 };
+                limit = self.kernel_limit(settings)?;
+                normal = self.normal(limit);
             } else {
-                damping *= UP;
-                if damping > GIVE_UP || step.amax() < CONVERGED {
-                    break;
-                }
+                damping = f64::max(damping * UP, FIRST);
+            }
+            if promised < CONVERGED || damping > GIVE_UP {
+                break;
             }
         }
-        pose
+        let cost = self.cost(&self.here, limit) + prior.distance2(&state);
+        Some(Minimum { state, normal, cost })
     }
 
-    /// The solution at a minimum; `None` if what is used does not determine a pose.
-    pub fn conclude(&self, pose: &Isometry3<f64>, used: Vec<bool>) -> Option<Solution> {
-        let mut squares_px = 0.0;
-        let mut chi2 = 0.0;
-        let mut corners = 0.0;
-        let (mut tags, mut cameras) = (BTreeSet::new(), BTreeSet::new());
-        for (k, observation) in self.observations.iter().enumerate().filter(|(k, _)| used[*k]) {
-            for residual in self.residuals(pose, k) {
-                chi2 += squared(residual);
-                squares_px += squared(residual) * observation.sigma_px.powi(2);
-                corners += 1.0;
-            }
-            tags.insert(observation.tag);
-            cameras.insert(observation.camera);
-        }
-        let covariance = self.normal(pose, &used).hessian.try_inverse()?;
-        // Two residuals a corner, less the six that the pose takes up.
-        let freedom: f64 = 2.0 * corners - 6.0;
-        let widening = (chi2 / freedom).max(1.0);
-        let covariance = (covariance + covariance.transpose()) * (0.5 * widening);
-        covariance.iter().all(|number| number.is_finite()).then(|| Solution {
-            world_from_shell: *pose,
-            covariance,
-            rms_px: f64::sqrt(squares_px / corners),
-            used,
-            tags: tags.len(),
-            cameras: cameras.len(),
-        })
-    }
-
-    /// J ᵀ W J, Jᵀ W r and the cost, with the kernel's weights W.
-    fn normal(&self, pose: &Isometry3<f64>, used: &[bool]) -> Normal {
-        let mut normal = Normal { hessian: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 };
-        for (k, observation) in self.observations.iter().enumerate().filter(|(k, _)| used[*k]) {
-            for (corner, measured) in self.corners[k].iter().zip(&observation.corners_px) {
-                match self.linearize(pose, observation, corner, measured) {
-                    None => normal.cost += self.kernel(BEHIND),
-                    Some((residual, jacobian)) => {
-                        let s = residual.norm_squared();
-                        let weight = 1.0 / (1.0 + s / self.settings.kernel_sigmas.powi(2));
-                        normal.hessian += jacobian.transpose() * jacobian * weight;
-                        normal.gradient += jacobian.transpose() * residual * weight;
-                        normal.cost += self.kernel(s);
-                    }
-                }
-            }
-        }
-        normal
-    }
-
-    /// Residual of a corner in standard deviations, and its derivative by the tangent.
     fn linearize(
-        &self,
-        pose: &Isometry3<f64>,
-        observation: &Observation,
-        corner: &Point3<f64>,
-        measured: &Point2<f64>,
-    ) -> Option<(Vector2<f64>, Matrix2x6<f64>)> {
-        let camera_from_world = &self.camera_from_world[observation.camera];
-        let in_camera = camera_from_world * (pose * corner);
-        let (pixel, by_point) = self.cameras[observation.camera].project_with_jacobian(&in_camera)?;
-        let scale = 1.0 / observation.sigma_px;
-        let by_position: Matrix2x3<f64> =
-            by_point * camera_from_world.rotation.to_rotation_matrix().matrix() * scale;
-        let by_rotation =
-            -by_position * pose.rotation.to_rotation_matrix().matrix() * corner.coords.cross_matrix();
-        let mut jacobian = Matrix2x6::zeros();
-        jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_position);
-        jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&by_rotation);
-        Some(((pixel - measured) * scale, jacobian))
+        terms: &[Option<Term>],
+        eyes: &[View],
+        views: &Views<'_>,
+        state: &State,
+        into: &mut [Linear],
+    ) {
+        for (term, linear) in terms.iter().zip(into) {
+            if let Some(term) = term {
+                term.linearize(views, eyes, state, linear);
+            }
+        }
     }
 
-    /// Residuals of the four corners in standard deviations; `None` for those behind the camera.
-    fn residuals(&self, pose: &Isometry3<f64>, k: usize) -> [Option<Vector2<f64>>; 4] {
-        let observation = &self.observations[k];
-        let camera_from_shell = self.camera_from_world[observation.camera] * pose;
-        std::array::from_fn(|c| {
-            let in_camera = camera_from_shell * self.corners[k][c];
-            let pixel = self.cameras[observation.camera].project(&in_camera)?;
-            Some((pixel - observation.corners_px[c]) / observation.sigma_px)
-        })
+    /// Where the kernel begins to fade: grows with the lower median of what counts; `None` if nothing does.
+    fn kernel_limit(&mut self, settings: &SolverSettings) -> Option<f64> {
+        Some(settings.kernel_chi2 * self.scale2()?)
     }
 
-    /// Cauchy's ρ(s) = k² ln(1 + s/k²).
-    fn kernel(&self, s: f64) -> f64 {
-        let k2 = self.settings.kernel_sigmas.powi(2);
-        k2 * (s / k2).ln_1p()
+    /// The variance that the data show, in units of the promised one: from the lower median, at least 1.
+    fn scale2(&mut self) -> Option<f64> {
+        let Self { sorted, here, fates, .. } = self;
+        sorted.clear();
+        let used = here.iter().zip(fates.iter()).filter(|(_, fate)| **fate == Fate::Used);
+        sorted.extend(used.map(|(linear, _)| linear.squared));
+        let middle = sorted.len().checked_sub(1)? / 2;
+        let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
+        Some((*median / MEDIAN).max(1.0))
+    }
+
+    fn cost(&self, linear: &[Linear], limit: f64) -> f64 {
+        self.used().map(|k| kernel(linear[k].squared, limit)).sum()
+    }
+
+    /// Σ w JᵀJ and Σ w Jᵀr of what counts, with the kernel's weights w.
+    fn normal(&self, limit: f64) -> Normal {
+        let mut hessian = Matrix12::zeros();
+        let mut gradient = Vector12::zeros();
+        for k in self.used() {
+            let Linear { residual, jacobian, squared } = &self.here[k];
+            if *squared >= BEHIND {
+                continue;
+            }
+            let weight = if *squared > limit { limit / squared } else { 1.0 };
+            for j in 0..12 {
+                let column: SVector<f64, 8> = jacobian.column(j) * weight;
+                for i in 0..=j {
+                    hessian[(i, j)] += jacobian.column(i).dot(&column);
+                }
+                gradient[j] += residual.dot(&column);
+            }
+        }
+        hessian.fill_lower_triangle_with_upper_triangle();
+        Normal { hessian, gradient }
+    }
+
+    /// χ² of what counts at the minimum, each tag at most what the kernel lets it.
+    pub fn chi2(&self) -> f64 {
+        self.used().map(|k| self.here[k].squared).sum()
+    }
+
+    /// Says of each observation whether it fits a state; whether anything changed.
+    fn judge(&mut self, views: &Views<'_>, state: &State, settings: &SolverSettings) -> bool {
+        /// With fewer tags the median says nothing of the noise: one of them may be false.
+        const ENOUGH: usize = 3;
+        let scale2 = if self.used_count() < ENOUGH { 1.0 } else { self.scale2().unwrap_or(1.0) };
+        let limit = settings.outlier_chi2 * scale2;
+        let mut changed = false;
+        for (k, term) in self.terms.iter().enumerate() {
+            let Some(term) = term else { continue };
+            let squared = self.here[k].squared;
+            let fits = squared <= limit || {
+                let rms_px = term.squares_px2(views, state).map(|sum| (sum / 4.0).sqrt());
+                rms_px.is_some_and(|rms_px| rms_px < settings.outlier_floor_px)
+            };
+            let fate = match (fits, term.faces(views, state)) {
+                (_, false) => Fate::FacingAway,
+                (true, true) => Fate::Used,
+                (false, true) => Fate::Outlier,
+            };
+            changed |= self.fates[k] != fate;
+            self.fates[k] = fate;
+        }
+        changed
     }
 }
 
-fn squared(residual: Option<Vector2<f64>>) -> f64 {
-    residual.map_or(BEHIND, |r| r.norm_squared())
-}
-
-/// Moves a pose along a tangent: position in world axes, rotation in shell axes.
-pub fn perturb(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
-    let shift: Vector3<f64> = step.fixed_rows::<3>(0).into();
-    let turn: Vector3<f64> = step.fixed_rows::<3>(3).into();
-    Isometry3::from_parts(
-        Translation3::from(pose.translation.vector + shift),
-        pose.rotation * UnitQuaternion::from_scaled_axis(turn),
-    )
+fn kernel(squared: f64, limit: f64) -> f64 {
+    if squared <= limit { squared } else { limit * (1.0 + (squared / limit).ln()) }
 }

@@ -1,7 +1,7 @@
 //! What the tracker believes about cameras, tags and hands.
 
 use super::filter::FilterSettings;
-use crate::detect::Detection;
+use crate::detect::{CornerCovariance, Detection};
 use crate::pose::SolverSettings;
 
 /// All settings of a [`super::Tracker`]; the defaults suit 720p cameras about a metre from a hand.
@@ -17,10 +17,9 @@ pub struct TrackerSettings {
     pub max_rms_px: f64,
     /// Jumps in a row after which the tracker believes them and begins anew.
     pub jumps_to_restart: u32,
-    /// Noise of a corner of a large tag, with what calibration leaves, standard deviation per axis, pixels.
-    pub corner_floor_px: f64,
-    /// Further error of a corner of a tag with sides of ten pixels, whose own cells bias its edges; falls with
-    /// the third power of the side (measured on rendered images with a lens blur of 0.7 pixels).
+    /// Error of a corner of a tag with sides of ten pixels, whose own cells bias its edges; falls with the third
+    /// power of the side (measured on rendered images with a lens blur of 0.7 pixels). Only for corners that come
+    /// without a covariance; what calibration leaves is [`SolverSettings::corner_floor_px`].
     pub corner_small_px: f64,
     /// What of that is left if the tag was searched enlarged.
     pub corner_enlarged: f64,
@@ -48,7 +47,6 @@ impl Default for TrackerSettings {
             horizon_ns: 250_000_000,
             max_rms_px: 2.0,
             jumps_to_restart: 3,
-            corner_floor_px: 0.04,
             corner_small_px: 0.75,
             corner_enlarged: 0.5,
             coarse_side_px: 30.0,
@@ -63,10 +61,17 @@ impl Default for TrackerSettings {
 }
 
 impl TrackerSettings {
-    /// Standard deviation of a detected corner along each axis, pixels.
+    /// How sure the corners of a detection are, without what calibration leaves.
+    pub fn corner_covariance_px2(&self, detection: &Detection) -> CornerCovariance {
+        detection.covariance_px2.unwrap_or_else(|| {
+            CornerCovariance::from_diagonal_element(self.corner_sigma_px(detection).powi(2))
+        })
+    }
+
+    /// Standard deviation along each axis, pixels, of a corner that comes without a covariance.
     pub fn corner_sigma_px(&self, detection: &Detection) -> f64 {
         let tens = detection.shortest_side_px() / 10.0;
         let enlarged = if detection.decimate < 1.0 { self.corner_enlarged } else { 1.0 };
-        self.corner_floor_px.hypot(enlarged * self.corner_small_px / tens.powi(3))
+        enlarged * self.corner_small_px / tens.powi(3)
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Isometry3, Matrix6, Point2, Vector3};
 
+use super::filter::Motion;
 use crate::camera::Camera;
 use crate::detect::expected::Refusal;
 use crate::detect::{Detection, Rect};
@@ -180,9 +181,10 @@ impl TrackUpdate {
     }
 }
 
-/// The mean capture time; 0 of nothing.
-pub(super) fn mean_time_ns(cameras: &[CameraUpdate]) -> u64 {
-    mean_ns(cameras.iter().map(|camera| camera.capture_ns))
+/// The mean capture time; `None` of nothing.
+pub(super) fn mean_time_ns<'a>(cameras: impl Iterator<Item = &'a CameraUpdate> + Clone) -> Option<u64> {
+    cameras.clone().next()?;
+    Some(mean_ns(cameras.map(|camera| camera.capture_ns)))
 }
 
 /// Shell and tag index of each id.
@@ -211,20 +213,25 @@ impl TagOwners {
     }
 }
 
-/// Fills in where a pose puts the corners of the tags that were found.
+/// Fills in where a shell's motion puts the corners of the tags that were found, each at its own time.
 pub(super) fn reproject(
     shell_index: usize,
     shell: &Shell,
-    pose: &Isometry3<f64>,
+    motion: &Motion,
     cameras: &[Camera],
     updates: &mut [CameraUpdate],
 ) {
     for update in updates {
         let Some(camera) = cameras.get(update.camera) else { continue };
-        let camera_from_shell = camera.world_from_camera.inverse() * pose;
+        let camera_from_world = camera.world_from_camera.inverse();
+        let since_s = (i128::from(update.capture_ns) - i128::from(motion.time_ns)) as f64 * 1e-9;
         for seen in update.tags.iter_mut().filter(|seen| seen.shell == shell_index) {
-            let corners = shell.tags[seen.tag].corners();
-            let pixels = corners.map(|corner| camera.project(&(camera_from_shell * corner)));
+            let Some(tag) = shell.tags.get(seen.tag) else { continue };
+            let (corners, found_px) = (tag.corners(), &seen.detection.corners_px);
+            let pixels: [Option<Point2<f64>>; 4] = std::array::from_fn(|c| {
+                let pose = motion.state().pose_after(since_s + camera.row_delay_s(found_px[c].y));
+                camera.project(&(camera_from_world * pose * corners[c]))
+            });
             seen.reprojected_px = match pixels {
                 [Some(a), Some(b), Some(c), Some(d)] => Some([a, b, c, d]),
                 _ => None,

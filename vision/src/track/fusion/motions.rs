@@ -1,0 +1,49 @@
+//! What an eye has to know: where each shell is going to be.
+
+use crate::track::TrackerSettings;
+use crate::track::filter::Motion;
+use crate::track::hinge::Hinge;
+
+/// How each shell moved when it was last measured, in the order of the shells.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Motions {
+    pub(super) motions: Vec<Option<Motion>>,
+    /// For each thumb, its palm and how it hangs on it.
+    pub(super) hinges: Vec<Option<(usize, Hinge)>>,
+    pub(super) horizon_ns: u64,
+}
+
+impl Motions {
+    /// The motion of each shell at an instant; `None` for those that are lost.
+    pub fn at(&self, time_ns: u64, settings: &TrackerSettings) -> Vec<Option<Motion>> {
+        let at = |motion: &Option<Motion>| {
+            let motion = motion.as_ref().filter(|motion| self.is_recent(motion, time_ns))?;
+            Some(motion.predicted(time_ns, &settings.filter))
+        };
+        self.motions.iter().map(at).collect()
+    }
+
+    /// As [`Motions::at`], but a thumb that is lost is expected where its palm and what was learned of the two
+    /// say; its covariance says how wide to search.
+    pub fn expected_at(&self, time_ns: u64, settings: &TrackerSettings) -> Vec<Option<Motion>> {
+        let mut motions = self.at(time_ns, settings);
+        for (shell, hinge) in self.hinges.iter().enumerate() {
+            let Some((palm, hinge)) = hinge else { continue };
+            if motions.get(shell).is_some_and(Option::is_none)
+                && let Some(Some(palm)) = motions.get(*palm)
+            {
+                motions[shell] = hinge.expected(palm, &settings.filter);
+            }
+        }
+        motions
+    }
+
+    /// Whether all shells are lost.
+    pub fn nothing_known_at(&self, time_ns: u64) -> bool {
+        self.motions.iter().flatten().all(|motion| !self.is_recent(motion, time_ns))
+    }
+
+    fn is_recent(&self, motion: &Motion, time_ns: u64) -> bool {
+        time_ns.abs_diff(motion.time_ns) <= self.horizon_ns
+    }
+}
