@@ -33,6 +33,9 @@ pub struct CameraSource {
     pub url: Option<String>,
     /// Which half of a side-by-side image (ZED over UVC) is this camera; the whole image if absent.
     pub half: Option<Half>,
+    /// A camera node on another machine reads this camera (`locoman-teleop detect`).
+    #[serde(default)]
+    pub remote: bool,
 }
 
 /// A half of a side-by-side stereo image.

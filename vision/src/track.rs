@@ -32,11 +32,11 @@ use crate::rig::Rig;
 use crate::shells::ShellSet;
 use crate::source::FrameSet;
 pub use eye::Eye;
-pub use filter::{FilterSettings, Motion};
+pub use filter::{FilterSettings, Matrix12, Motion};
 pub use fusion::{Fusion, Motions};
 pub use scout::Scout;
 pub use settings::TrackerSettings;
-pub use update::{CameraUpdate, SeenTag, ShellUpdate, TrackUpdate, Verdict};
+pub use update::{CameraUpdate, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};
 
 /// Follows all shells of a set with all cameras of a rig, one set of frames after the other.
 #[derive(Debug)]

@@ -13,7 +13,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
 
-type Matrix12 = SMatrix<f64, 12, 12>;
+/// Covariance of the whole state.
+pub type Matrix12 = SMatrix<f64, 12, 12>;
 
 /// How a hand moves, and what to believe.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,6 +88,22 @@ impl Motion {
             rate_rad_s: Vector3::zeros(),
             covariance: full,
         }
+    }
+
+    /// A motion that was described elsewhere; `covariance` as [`Motion::covariance`] gives it.
+    pub fn restored(
+        time_ns: u64,
+        world_from_shell: Isometry3<f64>,
+        velocity_m_s: Vector3<f64>,
+        rate_rad_s: Vector3<f64>,
+        covariance: Matrix12,
+    ) -> Self {
+        Self { time_ns, world_from_shell, velocity_m_s, rate_rad_s, covariance }
+    }
+
+    /// Covariance of position (world axes), rotation (shell axes), velocity (world) and angular velocity (shell).
+    pub fn covariance(&self) -> &Matrix12 {
+        &self.covariance
     }
 
     /// Covariance of position (world axes), then rotation (shell axes).
