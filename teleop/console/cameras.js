@@ -3,6 +3,7 @@
 const ACCEPTED = '#7fff7f';
 const REFUSED = '#ff5c57';
 const SEARCHED = '#5cb8ff';
+const MISSED = '#8592a6';
 const REPROJECTED = '#ffb454';
 const AXES = ['#ff5c57', '#7fd17f', '#6f9cff'];
 
@@ -35,7 +36,7 @@ export function makeCameras(parent) {
       }
       overlay(ctx, head, canvas.width / head.width);
       const accepted = head.tags.filter((tag) => tag.accepted).length;
-      const where = head.whole ? 'whole image' : `${head.regions.length} regions`;
+      const where = head.whole ? 'whole image searched' : head.regions.length ? `${head.regions.length} regions searched` : `${head.missed.length} covered`;
       caption.textContent = `${head.camera}${jpeg.size ? '' : ' (node)'} · ${accepted} of ${head.tags.length} tags · ${head.problem ?? where}`;
     } finally {
       it.busy = false;
@@ -55,6 +56,8 @@ function overlay(ctx, head, scale) {
   ctx.lineWidth = 1;
   ctx.setLineDash([4, 3]);
   for (const [x, y, w, h] of head.regions) outline([[x, y], [x + w, y], [x + w, y + h], [x, y + h]], SEARCHED);
+  // Expected and not read: a covered tag, mostly.
+  for (const tag of head.missed) outline(tag.corners, MISSED);
   ctx.setLineDash([]);
   ctx.font = '11px system-ui, "DejaVu Sans", sans-serif';
   for (const tag of head.tags) {

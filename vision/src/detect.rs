@@ -10,6 +10,7 @@
 //! A tag whose cells are smaller than two pixels is hard to read and its edges are biased by its own inner
 //! cells. A region may therefore be searched enlarged twice (`decimate` 0.5).
 
+pub mod expected;
 mod ffi;
 mod region;
 

@@ -56,6 +56,112 @@ pub fn shells() -> ShellSet {
     design::standard()
 }
 
+/// Deterministic random numbers: a linear congruence, twelve uniforms a normal number.
+pub struct Noise(pub u64);
+
+impl Noise {
+    /// From 0 to 1.
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Zero mean, unit variance.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// One tag before one camera, exactly: the lens, the pixel's area, a Gaussian blur, noise.
+pub struct TagPicture {
+    /// Who looks.
+    pub camera: Camera,
+    /// Where the tag is.
+    pub camera_from_tag: Isometry3<f64>,
+    /// Side of the black square.
+    pub size_m: f64,
+    /// Its number.
+    pub id: u32,
+    /// Standard deviation of the blur.
+    pub blur_px: f64,
+    /// Standard deviation of the noise; white is 160 above black.
+    pub noise_levels: f64,
+}
+
+impl TagPicture {
+    /// Where its corners are.
+    pub fn corners_px(&self) -> [Point2<f64>; 4] {
+        let h = self.size_m / 2.0;
+        [(-h, -h), (h, -h), (h, h), (-h, h)].map(|(x, y)| {
+            self.camera.project(&(self.camera_from_tag * Point3::new(x, y, 0.0))).expect("before the camera")
+        })
+    }
+
+    /// The image: the tag on white paper that fills its surroundings.
+    pub fn render(&self, seed: u64) -> GrayImage {
+        /// Samples along a pixel's side, and along the blur, in standard deviations.
+        const FINE: usize = 9;
+        const REACH_SIGMAS: f64 = 3.5;
+        const BLACK: f64 = 40.0;
+        const CONTRAST: f64 = 160.0;
+        let bitmap = tag_bitmap(self.id).expect("known id");
+        let corners = self.corners_px();
+        let low = |axis: usize| corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
+        let high = |axis: usize| corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
+        let margin = 0.25 * (high(0) - low(0)).max(high(1) - low(1)) + 6.0;
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let span = |axis: usize, size: usize| {
+            ((low(axis) - margin).max(0.0) as usize)..((high(axis) + margin).max(0.0) as usize).min(size)
+        };
+        let (columns, rows) = (span(0, width), span(1, height));
+        let (across, down) = (columns.len() * FINE, rows.len() * FINE);
+        let tag_from_camera = self.camera_from_tag.inverse();
+        let eye = tag_from_camera * Point3::origin();
+        let cell = self.size_m / 8.0;
+        let mut fine = vec![0.0f64; across * down];
+        for (at, light) in fine.iter_mut().enumerate() {
+            let place = |k: usize, start: usize| start as f64 + (k as f64 + 0.5) / FINE as f64 - 0.5;
+            let pixel = Point2::new(place(at % across, columns.start), place(at / across, rows.start));
+            let ray = tag_from_camera.rotation * self.camera.unproject(&pixel);
+            let hit = eye - ray * (eye.z / ray.z);
+            let (column, row) = ((hit.x / cell + 5.0).floor(), (5.0 - hit.y / cell).floor());
+            let inside = (0.0..10.0).contains(&column) && (0.0..10.0).contains(&row);
+            let white = !inside || bitmap.row(row as u32)[column as usize] != 0;
+            *light = f64::from(u8::from(white));
+        }
+        let sigma = self.blur_px * FINE as f64;
+        let reach = (REACH_SIGMAS * sigma).ceil() as isize;
+        let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        let blurred = |lights: &[f64], stride: usize, count: usize, at: usize, k: usize| -> f64 {
+            let sum: f64 = weights
+                .iter()
+                .zip(-reach..=reach)
+                .map(|(w, offset)| {
+                    let other = k.saturating_add_signed(offset).min(count - 1);
+                    w * lights[at - k * stride + other * stride]
+                })
+                .sum();
+            sum / total
+        };
+        let rowwise: Vec<f64> =
+            (0..fine.len()).map(|at| blurred(&fine, 1, across, at, at % across)).collect();
+        let fine: Vec<f64> =
+            (0..fine.len()).map(|at| blurred(&rowwise, across, down, at, at / across)).collect();
+        let mut noise = Noise(seed);
+        let mut pixels = vec![(BLACK + CONTRAST) as u8; width * height];
+        for (j, y) in rows.enumerate() {
+            for (i, x) in columns.clone().enumerate() {
+                let line = |k: usize| &fine[(j * FINE + k) * across + i * FINE..][..FINE];
+                let mean = (0..FINE).flat_map(line).sum::<f64>() / (FINE * FINE) as f64;
+                let grey = BLACK + CONTRAST * mean + self.noise_levels * noise.normal();
+                pixels[y * width + x] = grey.round().clamp(0.0, 255.0) as u8;
+            }
+        }
+        GrayImage::new(self.camera.width, self.camera.height, pixels).expect("size")
+    }
+}
+
 /// What a camera sees of the shells: nearer tags cover farther ones; nothing else is drawn.
 pub fn render(camera: &Camera, shells: &ShellSet, poses: &[Isometry3<f64>]) -> GrayImage {
     const BACKGROUND: u8 = 110;

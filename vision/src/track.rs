@@ -36,7 +36,7 @@ pub use filter::{FilterSettings, Matrix12, Motion};
 pub use fusion::{Fusion, Motions};
 pub use scout::Scout;
 pub use settings::TrackerSettings;
-pub use update::{CameraUpdate, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};
+pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};
 
 /// Follows all shells of a set with all cameras of a rig, one set of frames after the other.
 #[derive(Debug)]
@@ -113,7 +113,12 @@ fn look(eye: &mut Eye, scout: Option<&mut Scout>, frame: &Frame, motions: &Motio
     let mut update = eye.look(&image, frame.capture_ns, motions);
     update.decode_ns = decode_ns;
     if let Some(scout) = scout {
-        update.add(scout.search(&image, frame.capture_ns));
+        let mut found = scout.search(&image, frame.capture_ns);
+        found.tags.retain(|seen| !update.has_tag(seen.detection.id));
+        for seen in &mut found.tags {
+            eye.sharpen(&image, &mut seen.detection);
+        }
+        update.add(found);
     }
     update
 }

@@ -7,7 +7,7 @@
 use locoman_vision::camera::Camera;
 use locoman_vision::image::ImageError;
 use locoman_vision::rig::Rig;
-use locoman_vision::track::SeenTag;
+use locoman_vision::track::{MissedTag, SeenTag};
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 
@@ -26,6 +26,7 @@ struct Head<'a> {
     width: u32,
     height: u32,
     tags: Vec<Tag>,
+    missed: Vec<Missed>,
     /// x, y, width, height of what was searched.
     regions: Vec<[u32; 4]>,
     whole: bool,
@@ -42,6 +43,14 @@ struct Tag {
     reprojected: Option<[[f64; 2]; 4]>,
     /// The largest distance of a corner from there.
     off_px: Option<f64>,
+}
+
+/// A tag that was expected and not read.
+#[derive(Debug, Serialize)]
+struct Missed {
+    id: u32,
+    corners: [[f64; 2]; 4],
+    why: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -61,6 +70,7 @@ pub(super) fn message(rig: &Rig, shown: &Shown) -> Result<Option<Vec<u8>>, Image
         width: camera.width,
         height: camera.height,
         tags: shown.seen.tags.iter().map(tag).collect(),
+        missed: shown.seen.missed.iter().map(missed).collect(),
         regions: shown.seen.searched.iter().map(|rect| [rect.x, rect.y, rect.width, rect.height]).collect(),
         whole: shown.seen.searched_whole,
         problem: shown.seen.problem.as_deref(),
@@ -87,6 +97,10 @@ fn tag(tag: &SeenTag) -> Tag {
         reprojected: tag.reprojected_px.map(|corners| corners.map(Into::into)),
         off_px: tag.reprojected_px.as_ref().map(off),
     }
+}
+
+fn missed(tag: &MissedTag) -> Missed {
+    Missed { id: tag.id, corners: tag.corners_px.map(Into::into), why: tag.refusal.to_string() }
 }
 
 /// `None` if the origin is not in the image.

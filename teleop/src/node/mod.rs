@@ -165,21 +165,22 @@ impl Publisher {
     /// Waits for the next sighting, shortly, and passes it on; `false` at the end.
     fn pass_on(&mut self, seen: &Receiver<Sighting>) -> bool {
         match seen.recv_timeout(NAP) {
-            Ok(Sighting::Read(reading)) => self.publish(&reading.update),
-            Ok(Sighting::Searched(found)) if !found.tags.is_empty() => self.publish(&found),
+            Ok(Sighting::Read(reading)) => self.publish(&reading.update, false),
+            Ok(Sighting::Searched(found)) if !found.tags.is_empty() => self.publish(&found, true),
             Ok(_) | Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return false,
         }
         true
     }
 
-    fn publish(&mut self, update: &CameraUpdate) {
+    fn publish(&mut self, update: &CameraUpdate, again: bool) {
         let Some(Some(sender)) = self.senders.get_mut(update.camera) else { return };
         let Some(counters) = self.counters.cameras.get(update.camera) else { return };
         let message = Detections {
             frames: counters.frames.load(Ordering::Relaxed),
             dropped: counters.dropped.load(Ordering::Relaxed),
             clock: self.clock.offset(),
+            again,
             ..wire::detections(&self.rig, update)
         };
         if let Err(error) = sender.send(update.capture_ns, message) {

@@ -99,8 +99,10 @@ impl Intake {
                 counters.set_clock(clock);
             }
         }
-        let sighting = if update.searched_whole {
+        if update.searched_whole {
             self.counters.count(update.camera, |counters| &counters.searched_whole);
+        }
+        let sighting = if message.again {
             Sighting::Searched(Box::new(update))
         } else {
             Sighting::Read(Box::new(Reading { update, in_memory_ns: 0, image: None }))

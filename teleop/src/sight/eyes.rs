@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use locoman_vision::image::{Frame, GrayImage, ImageError, Pixels};
 use locoman_vision::track::{CameraUpdate, Eye};
 
+use super::scouting::Lookout;
 use super::{Counters, Inbox, Outlook, Reading, Sighting};
 use crate::latest::lock;
 
@@ -17,6 +18,8 @@ pub(super) type Doubtful = (Arc<GrayImage>, u64);
 pub(super) struct Reader {
     /// One a camera; the inbox keeps two threads from one.
     pub eyes: Arc<Vec<Mutex<Eye>>>,
+    /// Likewise; the scout has them while something, not everything, is lost.
+    pub lookouts: Arc<Vec<Mutex<Lookout>>>,
     pub frames: Arc<Inbox<Frame>>,
     /// For the scout.
     pub doubtful: Arc<Inbox<Doubtful>>,
@@ -48,17 +51,30 @@ impl Reader {
                 return self.noted(Reading { update, in_memory_ns: 0, image: None }, begun_ns);
             }
         };
+        let motions = self.outlook.motions();
         let mut update = match self.eyes.get(camera) {
-            Some(eye) => lock(eye).look(&image, capture_ns, &self.outlook.motions()),
+            Some(eye) => lock(eye).look(&image, capture_ns, &motions),
             None => CameraUpdate::nothing(camera, capture_ns),
         };
         update.decode_ns = in_memory_ns.saturating_sub(begun_ns);
-        if self.outlook.something_lost() {
+        if motions.nothing_known_at(capture_ns) {
+            // Nothing is tracked that this could delay, and all cameras together find a shell best.
+            self.search_at_once(&image, &mut update);
+        } else if self.outlook.something_lost() {
             // A search that waits is replaced by the newer one.
             let _ = self.doubtful.put(camera, (Arc::clone(&image), capture_ns));
         }
         let image = self.outlook.watched.load(Ordering::Relaxed).then_some(image);
         self.noted(Reading { update, in_memory_ns, image }, begun_ns)
+    }
+
+    fn search_at_once(&self, image: &GrayImage, update: &mut CameraUpdate) {
+        let Some(lookout) = self.lookouts.get(update.camera) else { return };
+        let mut lookout = lock(lookout);
+        if lookout.alert(update.capture_ns) {
+            update.add(lookout.search(image, update.capture_ns));
+            self.counters.count(update.camera, |counters| &counters.searched_whole);
+        }
     }
 
     fn noted(&self, reading: Reading, begun_ns: u64) -> Reading {

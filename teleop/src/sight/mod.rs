@@ -8,6 +8,8 @@
 //!                                  while something is lost
 //! ```
 //!
+//! While nobody is known to be there the eyes search whole images themselves.
+//!
 //! The newest frame of a camera wins; one that nobody had time for is counted and gone, nothing queues. The scout
 //! runs after everybody else: what is tracked is never delayed by the search for what is lost.
 
@@ -27,11 +29,12 @@ use locoman_vision::image::{Frame, GrayImage};
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
 use locoman_vision::source::{FrameSource, SourceError};
-use locoman_vision::track::{CameraUpdate, Eye, Motions, Scout, TrackerSettings};
+use locoman_vision::track::{CameraUpdate, Eye, Motions, TrackerSettings};
 
 use crate::latest::lock;
 pub use counters::{CameraCounters, Counters};
 pub use inbox::Inbox;
+use scouting::Lookout;
 
 /// Sightings that wait for whoever takes them in: a second's worth, so that nobody ever waits to hand one over.
 pub const SIGHTINGS: usize = 1024;
@@ -148,8 +151,8 @@ impl Sight {
         let cameras = 0..rig.cameras.len();
         let eye = |camera| Ok(Mutex::new(Eye::new(rig, camera, shells, settings)?));
         let eyes: Arc<Vec<Mutex<Eye>>> = Arc::new(cameras.clone().map(eye).collect::<Result<_>>()?);
-        let scouts: Vec<Scout> =
-            cameras.map(|camera| Scout::new(rig, camera, shells, settings)).collect::<Result<_, _>>()?;
+        let lookout = |camera| Ok(Mutex::new(Lookout::new(rig, camera, shells, settings)?));
+        let lookouts: Arc<Vec<Mutex<Lookout>>> = Arc::new(cameras.map(lookout).collect::<Result<_>>()?);
         let frames = Arc::new(Inbox::<Frame>::new(here.len()));
         let doubtful = Arc::new(Inbox::new(here.len()));
         let readers = here.iter().filter(|here| **here).count().clamp(1, cores());
@@ -157,6 +160,7 @@ impl Sight {
         for number in 0..readers {
             let reader = eyes::Reader {
                 eyes: Arc::clone(&eyes),
+                lookouts: Arc::clone(&lookouts),
                 frames: Arc::clone(&frames),
                 doubtful: Arc::clone(&doubtful),
                 outlook: Arc::clone(outlook),
@@ -169,7 +173,7 @@ impl Sight {
         others.push(spawn("scout", {
             let (outlook, counters) = (Arc::clone(outlook), Arc::clone(counters));
             let sightings = sightings.clone();
-            move || scouting::run(scouts, &doubtful, &outlook, &counters, &sightings)
+            move || scouting::run(&lookouts, &doubtful, &outlook, &counters, &sightings)
         })?);
         let capture = spawn("capture", {
             let (outlook, counters) = (Arc::clone(outlook), Arc::clone(counters));

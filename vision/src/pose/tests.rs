@@ -5,21 +5,7 @@ use proptest::prelude::*;
 
 use super::problem::perturb;
 use super::*;
-use crate::testing;
-
-/// Deterministic normal numbers: a linear congruence, twelve uniforms a number.
-struct Noise(u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
+use crate::testing::{self, Noise};
 
 /// What the rig sees of a shell: tags that face a camera by 60 degrees and less.
 fn observe(shell: &Shell, pose: &Isometry3<f64>, sigma_px: f64, noise: &mut Noise) -> Vec<Observation> {

@@ -1,13 +1,20 @@
 //! One camera's view of what is already followed: tags are read where they are expected.
+//!
+//! What is not where it should be is searched by the library in a small region round its shell, at most one
+//! region an image and the cameras in turn, so that a hidden shell costs little and no image is late.
 
 use std::time::Instant;
 
+use nalgebra::{Matrix3, Vector2};
+
+use super::filter::Motion;
 use super::fusion::Motions;
-use super::plan;
-use super::update::{CameraUpdate, TagOwners};
+use super::plan::{self, Expected};
+use super::update::{CameraUpdate, MissedTag, SeenTag, TagOwners};
 use super::{TrackerSettings, nanoseconds};
 use crate::camera::Camera;
-use crate::detect::{Detector, DetectorError, Search};
+use crate::detect::expected::{Expectation, Reader, Reading};
+use crate::detect::{Detection, Detector, DetectorError, Region, Search};
 use crate::image::GrayImage;
 use crate::rig::Rig;
 use crate::shells::ShellSet;
@@ -19,9 +26,11 @@ pub struct Eye {
     camera: Camera,
     shells: ShellSet,
     settings: TrackerSettings,
+    reader: Reader,
     detector: Detector,
     owners: TagOwners,
-    /// Counts images: when a lost thumb is searched round its palm.
+    expected: Vec<Expected>,
+    /// Counts images: in every so many it is this camera's turn to search regions.
     images: usize,
     cameras: usize,
 }
@@ -35,13 +44,16 @@ impl Eye {
         settings: &TrackerSettings,
     ) -> Result<Self, DetectorError> {
         let owners = TagOwners::new(shells);
+        let ids = owners.ids();
         Ok(Self {
             index,
             camera: rig.cameras[index].clone(),
             shells: shells.clone(),
             settings: settings.clone(),
-            detector: Detector::new(&owners.ids())?,
+            reader: Reader::new(&rig.cameras[index], &ids),
+            detector: Detector::new(&ids)?,
             owners,
+            expected: Vec::new(),
             images: index,
             cameras: rig.cameras.len(),
         })
@@ -56,14 +68,138 @@ impl Eye {
         self.images += 1;
         let my_turn = self.images.is_multiple_of(self.cameras);
         let motions = motions.at(capture_ns, &self.settings);
-        let regions = plan::regions(&self.camera, &self.shells, &motions, &self.settings, my_turn);
-        let found = self.detector.detect(image, Search::Regions(&regions));
-        CameraUpdate {
-            tags: self.owners.assign(found),
-            searched: regions.iter().map(|region| region.rect).collect(),
-            detect_ns: nanoseconds(begun.elapsed()),
-            ..CameraUpdate::nothing(self.index, capture_ns)
+        let mut update = CameraUpdate::nothing(self.index, capture_ns);
+        let mut sought: Option<Region> = None;
+        for (shell, motion) in motions.iter().enumerate() {
+            match motion {
+                Some(motion) => {
+                    if self.read_shell(image, shell, motion, &mut update) || !my_turn {
+                        continue;
+                    }
+                    let region =
+                        plan::tags_region(&self.camera, &self.shells.shells[shell], motion, &self.settings);
+                    sought = larger(sought, region);
+                }
+                None if my_turn => {
+                    let palm = self.shells.palm_of(shell).and_then(|palm| motions[palm].as_ref());
+                    let region = palm.and_then(|palm| plan::thumb_region(&self.camera, palm, &self.settings));
+                    sought = larger(sought, region);
+                }
+                None => {}
+            }
         }
+        if let Some(region) = sought {
+            let found = self.detector.detect(image, Search::Regions(&[region]));
+            update.searched.push(region.rect);
+            self.add_found(image, found, &mut update);
+        }
+        update.detect_ns = nanoseconds(begun.elapsed());
+        update
+    }
+
+    /// Sharpens the corners of tags that a search has found in an image of this camera.
+    pub fn sharpen(&mut self, image: &GrayImage, detection: &mut Detection) -> bool {
+        /// The library is right within a pixel, or wrong altogether.
+        const DOUBT_PX: f64 = 1.0;
+        let start = Expectation::from_corners(detection.id, &self.camera, &detection.corners_px, DOUBT_PX);
+        match start.map(|start| self.reader.read(image, &start)) {
+            Some(Ok(reading)) => {
+                *detection = reading_as_detection(detection.id, &reading);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Reads the tags of one shell; whether it is as it should be: any were read, or none expected.
+    fn read_shell(
+        &mut self,
+        image: &GrayImage,
+        shell: usize,
+        motion: &Motion,
+        update: &mut CameraUpdate,
+    ) -> bool {
+        let mut expected = std::mem::take(&mut self.expected);
+        plan::expected_tags(&self.camera, &self.shells.shells[shell], motion, &self.settings, &mut expected);
+        // What the first tags have shown holds for the rest: the shell is rigid.
+        let mut offset = Offset::default();
+        for tag in &expected {
+            let expectation = offset.applied(&tag.expectation);
+            let id = expectation.id;
+            match self.reader.read(image, &expectation) {
+                Ok(reading) => {
+                    offset.add(&self.camera, tag, &reading);
+                    let detection = reading_as_detection(id, &reading);
+                    update.tags.push(SeenTag::new(detection, shell, tag.tag));
+                }
+                Err(refusal) => {
+                    update.missed.push(MissedTag { id, shell, corners_px: tag.corners_px, refusal });
+                }
+            }
+        }
+        let content = expected.is_empty() || offset.count > 0.0;
+        self.expected = expected;
+        content
+    }
+
+    fn add_found(&mut self, image: &GrayImage, found: Vec<Detection>, update: &mut CameraUpdate) {
+        for mut seen in self.owners.assign(found) {
+            if !update.has_tag(seen.detection.id) {
+                self.sharpen(image, &mut seen.detection);
+                update.tags.push(seen);
+            }
+        }
+    }
+}
+
+/// How far, in the ideal image, tags of a shell lie from where they were expected.
+#[derive(Debug, Default)]
+struct Offset {
+    sum: Vector2<f64>,
+    count: f64,
+}
+
+impl Offset {
+    /// What is left of the doubt once tags of the same shell have been read, pixels.
+    const LEFT_PX: f64 = 2.0;
+
+    fn add(&mut self, camera: &Camera, tag: &Expected, reading: &Reading) {
+        let middle = |corners: &[nalgebra::Point2<f64>; 4]| {
+            nalgebra::Point2::from((corners[0].coords + corners[2].coords) / 2.0)
+        };
+        let (found, expected) = (middle(&reading.corners_px), middle(&tag.corners_px));
+        self.sum += camera.unproject(&found).xy() - camera.unproject(&expected).xy();
+        self.count += 1.0;
+    }
+
+    fn applied(&self, expectation: &Expectation) -> Expectation {
+        if self.count == 0.0 {
+            return *expectation;
+        }
+        let shift = Matrix3::new_translation(&(self.sum / self.count));
+        Expectation {
+            ideal_from_cells: shift * expectation.ideal_from_cells,
+            doubt_px: expectation.doubt_px.min(Self::LEFT_PX),
+            ..*expectation
+        }
+    }
+}
+
+fn reading_as_detection(id: u32, reading: &Reading) -> Detection {
+    Detection {
+        id,
+        hamming: reading.wrong_cells,
+        margin: 0.5 * reading.contrast,
+        corners_px: reading.corners_px,
+        decimate: 1.0,
+        covariance_px2: Some(reading.covariance_px2),
+    }
+}
+
+fn larger(one: Option<Region>, other: Option<Region>) -> Option<Region> {
+    match (one, other) {
+        (Some(a), Some(b)) => Some(if b.rect.area() > a.rect.area() { b } else { a }),
+        (a, b) => a.or(b),
     }
 }
 

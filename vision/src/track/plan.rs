@@ -1,4 +1,5 @@
-//! Where a camera searches: round the predicted tags of each shell, as finely as their size asks for.
+//! What a camera looks for: the tags of a shell that face it, where the shell is predicted; and regions to search
+//! where tags were not as predicted.
 //!
 //! Thumb tags are too small for a search of the whole image: a lost thumb is searched round its palm.
 
@@ -7,33 +8,69 @@ use nalgebra::{Point2, Point3, Vector3};
 use super::TrackerSettings;
 use super::filter::Motion;
 use crate::camera::Camera;
+use crate::detect::expected::Expectation;
 use crate::detect::{Rect, Region};
-use crate::shells::{Shell, ShellSet};
+use crate::shells::Shell;
 
 /// Tags seen more obliquely than this (cosine of the angle between normal and line of sight) are not waited for.
 const FACING_COS: f64 = 0.2;
 
-/// Where one camera searches, given where the shells are; for lost thumbs only if it is its turn.
-pub(super) fn regions(
+/// A tag that should be seen.
+#[derive(Debug, Clone)]
+pub(super) struct Expected {
+    /// Index into the shell's tags.
+    pub tag: usize,
+    pub expectation: Expectation,
+    /// Where its corners should be.
+    pub corners_px: [Point2<f64>; 4],
+    area_px2: f64,
+}
+
+/// The tags of a shell that should be seen by a camera, the largest first.
+pub(super) fn expected_tags(
     camera: &Camera,
-    shells: &ShellSet,
-    motions: &[Option<Motion>],
+    shell: &Shell,
+    motion: &Motion,
     settings: &TrackerSettings,
-    my_turn: bool,
-) -> Vec<Region> {
-    let region = |(index, (shell, motion)): (usize, (&Shell, &Option<Motion>))| match motion {
-        Some(motion) => tags_region(camera, shell, motion, settings),
-        None if my_turn => {
-            let palm = motions.get(shells.palm_of(index)?)?.as_ref()?;
-            thumb_region(camera, palm, settings)
+    expected: &mut Vec<Expected>,
+) {
+    expected.clear();
+    let camera_from_shell = camera.world_from_camera.inverse() * motion.world_from_shell;
+    let doubt_px = doubt_px(camera, shell, motion, settings);
+    for (index, tag) in shell.tags.iter().enumerate() {
+        let camera_from_tag = camera_from_shell * tag.shell_from_tag;
+        let center = camera_from_tag.translation.vector;
+        let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center.normalize());
+        if facing < FACING_COS {
+            continue;
         }
-        None => None,
-    };
-    merged(shells.shells.iter().zip(motions).enumerate().filter_map(region).collect())
+        let corners = tag.corners().map(|corner| camera.project(&(camera_from_shell * corner)));
+        let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
+        let corners_px = [a, b, c, d];
+        if !corners_px.iter().all(|corner| camera.contains(corner)) {
+            continue;
+        }
+        expected.push(Expected {
+            tag: index,
+            expectation: Expectation::from_pose(tag.id, &camera_from_tag, tag.size_m, doubt_px),
+            corners_px,
+            area_px2: (c - a).perp(&(d - b)).abs(),
+        });
+    }
+    expected.sort_by(|a, b| b.area_px2.total_cmp(&a.area_px2));
+}
+
+/// How far from where they are expected a shell's tags may be.
+fn doubt_px(camera: &Camera, shell: &Shell, motion: &Motion, settings: &TrackerSettings) -> f64 {
+    let depth_m = (camera.world_from_camera.inverse() * motion.world_from_shell * Point3::origin()).z;
+    let variance = motion.pose_covariance();
+    let largest = |first: usize| (0..3).map(|k| variance[(first + k, first + k)]).fold(0.0, f64::max).sqrt();
+    let doubt_m = largest(0) + largest(3) * shell.radius_m();
+    settings.least_doubt_px + settings.margin_sigmas * doubt_m * camera.focal_px.x / depth_m.max(0.1)
 }
 
 /// Round the tags of a shell that face the camera.
-fn tags_region(
+pub(super) fn tags_region(
     camera: &Camera,
     shell: &Shell,
     motion: &Motion,
@@ -71,35 +108,13 @@ fn tags_region(
 }
 
 /// Round a palm, where its thumb must be.
-fn thumb_region(camera: &Camera, palm: &Motion, settings: &TrackerSettings) -> Option<Region> {
+pub(super) fn thumb_region(camera: &Camera, palm: &Motion, settings: &TrackerSettings) -> Option<Region> {
     let center = camera.world_from_camera.inverse() * palm.world_from_shell * Point3::origin();
     let pixel = camera.project(&center)?;
     let mut bounds = Bounds::default();
     bounds.include(&pixel);
     let reach_px = settings.thumb_reach_m * camera.focal_px.x / center.z;
     Some(Region { rect: bounds.grown(reach_px, camera)?, decimate: 0.5 })
-}
-
-/// Joins overlapping regions of the same fineness where that saves pixels.
-fn merged(mut regions: Vec<Region>) -> Vec<Region> {
-    let mut a = 0;
-    while a < regions.len() {
-        let joinable = |b: &usize| {
-            let (one, other) = (&regions[a], &regions[*b]);
-            let joint = one.rect.union(&other.rect).area();
-            one.decimate == other.decimate && joint <= one.rect.area() + other.rect.area()
-        };
-        match (a + 1..regions.len()).find(joinable) {
-            None => a += 1,
-            Some(b) => {
-                let other = regions.remove(b);
-                regions[a].rect = regions[a].rect.union(&other.rect);
-                // The larger region may now overlap earlier ones.
-                a = 0;
-            }
-        }
-    }
-    regions
 }
 
 /// A growing rectangle in pixel coordinates.

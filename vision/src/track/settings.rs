@@ -32,6 +32,8 @@ pub struct TrackerSettings {
     pub full_decimate: f32,
     /// How many standard deviations of the predicted position a region leaves round its tags.
     pub margin_sigmas: f64,
+    /// Tags are looked for this far from where they are predicted, and farther by the doubt of the prediction.
+    pub least_doubt_px: f64,
     /// What a region leaves round its tags at least, pixels.
     pub margin_px: f64,
     /// Half the width of the cube round the palm in which its lost thumb is searched, metres.
@@ -53,6 +55,7 @@ impl Default for TrackerSettings {
             fine_side_px: 18.0,
             full_decimate: 2.0,
             margin_sigmas: 2.0,
+            least_doubt_px: 2.0,
             margin_px: 5.0,
             thumb_reach_m: 0.12,
         }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{Isometry3, Matrix6, Point2, Vector3};
 
 use crate::camera::Camera;
+use crate::detect::expected::Refusal;
 use crate::detect::{Detection, Rect};
 use crate::shells::{Shell, ShellSet};
 use crate::source::mean_ns;
@@ -72,6 +73,26 @@ pub struct SeenTag {
     pub reprojected_px: Option<[Point2<f64>; 4]>,
 }
 
+impl SeenTag {
+    /// A tag of a shell, not yet judged.
+    pub fn new(detection: Detection, shell: usize, tag: usize) -> Self {
+        Self { detection, shell, tag, used: false, reprojected_px: None }
+    }
+}
+
+/// A tag that should have been seen and was not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissedTag {
+    /// Its number within the family.
+    pub id: u32,
+    /// Index of the shell that it is on.
+    pub shell: usize,
+    /// Where it was expected.
+    pub corners_px: [Point2<f64>; 4],
+    /// Why it was not read.
+    pub refusal: Refusal,
+}
+
 /// What one camera contributed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraUpdate {
@@ -81,6 +102,8 @@ pub struct CameraUpdate {
     pub capture_ns: u64,
     /// The tags in its image.
     pub tags: Vec<SeenTag>,
+    /// The tags that were expected and not read.
+    pub missed: Vec<MissedTag>,
     /// The regions that were searched.
     pub searched: Vec<Rect>,
     /// Whether the whole image was searched.
@@ -100,6 +123,7 @@ impl CameraUpdate {
             camera,
             capture_ns,
             tags: Vec::new(),
+            missed: Vec::new(),
             searched: Vec::new(),
             searched_whole: false,
             decode_ns: 0,
@@ -113,10 +137,19 @@ impl CameraUpdate {
         Self { problem: Some(problem), ..Self::nothing(camera, capture_ns) }
     }
 
+    /// Whether a tag was found.
+    pub fn has_tag(&self, id: u32) -> bool {
+        self.tags.iter().any(|seen| seen.detection.id == id)
+    }
+
     /// Adds what another search of the same frame found and this one did not.
     pub fn add(&mut self, other: Self) {
-        let known: Vec<u32> = self.tags.iter().map(|seen| seen.detection.id).collect();
-        self.tags.extend(other.tags.into_iter().filter(|seen| !known.contains(&seen.detection.id)));
+        for seen in other.tags {
+            if !self.has_tag(seen.detection.id) {
+                self.tags.push(seen);
+            }
+        }
+        self.missed.extend(other.missed);
         self.searched.extend(other.searched);
         self.searched_whole |= other.searched_whole;
         self.detect_ns += other.detect_ns;
@@ -174,7 +207,7 @@ impl TagOwners {
     pub fn assign(&self, found: Vec<Detection>) -> Vec<SeenTag> {
         let seen = |detection: Detection| {
             let &(shell, tag) = self.0.get(&detection.id)?;
-            Some(SeenTag { detection, shell, tag, used: false, reprojected_px: None })
+            Some(SeenTag::new(detection, shell, tag))
         };
         found.into_iter().filter_map(seen).collect()
     }

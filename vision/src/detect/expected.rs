@@ -1,0 +1,359 @@
+//! Reads tags where they are expected: no search for quadrilaterals, no decoding of unknown codes.
+//!
+//! ```text
+//!  expected homography ──► align ──────► check ────────► fit ───────────► Reading
+//!  (from a predicted       the tag's     do all cells    all its edges,   corners and
+//!   pose, or corners       own pattern,  have the right  in the ideal     their covariance
+//!   found by a search)     shifted       colour?         image
+//! ```
+//!
+//! What does not look like the tag is refused with the reason, and left to the search by the library.
+//! Corners follow [`super`]'s convention; the fit itself, and why it is right within a hundredth of a pixel, is
+//! in [`fit`].
+
+mod align;
+mod fit;
+mod pattern;
+mod rays;
+mod sample;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix2, Matrix3, Point2, SMatrix, Vector2, Vector3};
+
+use super::CornerCovariance;
+use crate::camera::Camera;
+use crate::image::GrayImage;
+use fit::{Appearance, Effort, Fit, Samples};
+use pattern::{CORNERS, MIDDLE, Pattern};
+use rays::RayGrid;
+
+/// Where a tag is expected.
+#[derive(Debug, Clone, Copy)]
+pub struct Expectation {
+    /// Its number within the family.
+    pub id: u32,
+    /// Homography from cell coordinates (see [`Expectation::from_pose`]) to the ideal image (x/z, y/z).
+    pub ideal_from_cells: Matrix3<f64>,
+    /// How far off it may be, pixels.
+    pub doubt_px: f64,
+}
+
+/// A tag that was read.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// Corners: bottom left, bottom right, top right, top left of the printed tag.
+    pub corners_px: [Point2<f64>; 4],
+    /// How sure they are, by the noise of this very tag.
+    pub covariance_px2: CornerCovariance,
+    /// White above black, grey levels.
+    pub contrast: f64,
+    /// Standard deviation of what the fit leaves, grey levels.
+    pub noise: f64,
+    /// Standard deviation of the blur along the tag's sides, pixels.
+    pub blur_px: [f64; 2],
+    /// Cells that have the wrong colour.
+    pub wrong_cells: u32,
+}
+
+/// Why a tag was not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// The family has no such tag, or this reader does not know it.
+    #[error("the tag is not known")]
+    Unknown,
+    /// It lies not wholly inside the image, or behind the camera.
+    #[error("the tag is not wholly inside the image")]
+    Outside,
+    /// Its cells would be smaller than can be told apart.
+    #[error("the tag is too small to be read")]
+    Small,
+    /// What is there has the wrong cells: something covers it, or it is not there.
+    #[error("the cells are not those of the tag")]
+    Cells,
+    /// Too little difference between black and white.
+    #[error("too little contrast")]
+    Contrast,
+    /// The picture of the tag cannot be brought into line with the image.
+    #[error("the picture of the tag does not fit")]
+    Misfit,
+}
+
+/// Tags with shorter sides than this are not read: their cells are smaller than 1.5 pixels.
+const LEAST_SIDE_PX: f64 = 12.0;
+/// White above black at least, grey levels.
+const LEAST_CONTRAST: f64 = 16.0;
+/// Residuals beyond this share of the contrast are no tag. Noise of 1 %, uneven light and print add to 5.
+const MOST_RESIDUAL: f64 = 0.15;
+/// How far the fit may move the aligned tag, in cells: the rest is another tag or none.
+const FARTHEST_CELLS: f64 = 1.0;
+/// Rows of pixels that are sampled on a tag of this size or larger.
+const ROWS: f64 = 25.0;
+/// Half-width of the blur to begin with, pixels: a lens of σ = 0.7 px and the pixel itself, σ = 0.29 px.
+const START_BLUR_PX: f64 = 2.27;
+/// The kernel's half-width in standard deviations.
+const BLUR_SIGMAS: f64 = 3.0;
+
+/// Reads expected tags in the images of one camera. One for each thread.
+#[derive(Debug)]
+pub struct Reader {
+    camera: Camera,
+    rays: RayGrid,
+    patterns: BTreeMap<u32, Pattern>,
+    samples: Samples,
+    row: Vec<[f32; 2]>,
+}
+
+impl Expectation {
+    /// Where a tag is seen: `camera_from_tag` in the tag's frame of [`crate::shells`].
+    pub fn from_pose(
+        id: u32,
+        camera_from_tag: &nalgebra::Isometry3<f64>,
+        size_m: f64,
+        doubt_px: f64,
+    ) -> Self {
+        let cell_m = size_m / 8.0;
+        let rotation = camera_from_tag.rotation.to_rotation_matrix();
+        let (x, y) = (rotation.matrix().column(0) * cell_m, rotation.matrix().column(1) * -cell_m);
+        let origin = camera_from_tag.translation.vector - (x + y) * MIDDLE;
+        Self { id, ideal_from_cells: Matrix3::from_columns(&[x, y, origin]), doubt_px }
+    }
+
+    /// Where a search has found a tag: its corners as this module reports them.
+    pub fn from_corners(
+        id: u32,
+        camera: &Camera,
+        corners_px: &[Point2<f64>; 4],
+        doubt_px: f64,
+    ) -> Option<Self> {
+        let rays = corners_px.map(|corner| camera.unproject(&corner));
+        // Eight equations for the eight ratios of the homography's elements.
+        let mut matrix = SMatrix::<f64, 8, 8>::zeros();
+        let mut right = nalgebra::SVector::<f64, 8>::zeros();
+        for (k, ([u, v], ray)) in CORNERS.into_iter().zip(rays).enumerate() {
+            for (axis, value) in [ray.x, ray.y].into_iter().enumerate() {
+                let at = 2 * k + axis;
+                let own = [u, v, 1.0];
+                for (i, number) in own.into_iter().enumerate() {
+                    matrix[(at, 3 * axis + i)] = number;
+                }
+                matrix[(at, 6)] = -value * u;
+                matrix[(at, 7)] = -value * v;
+                right[at] = value;
+            }
+        }
+        let h = matrix.lu().solve(&right)?;
+        let ideal_from_cells = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
+        Some(Self { id, ideal_from_cells, doubt_px })
+    }
+}
+
+impl Reader {
+    /// For a camera, and the tags that it may see.
+    pub fn new(camera: &Camera, ids: &[u32]) -> Self {
+        Self {
+            rays: RayGrid::new(camera),
+            camera: camera.clone(),
+            patterns: ids.iter().filter_map(|id| Some((*id, Pattern::new(*id)?))).collect(),
+            samples: Samples::default(),
+            row: Vec::new(),
+        }
+    }
+
+    /// Reads one tag.
+    pub fn read(&mut self, image: &GrayImage, expectation: &Expectation) -> Result<Reading, Refusal> {
+        let pattern = self.patterns.get(&expectation.id).ok_or(Refusal::Unknown)?;
+        let view = View::new(&self.camera, &expectation.ideal_from_cells)?;
+        let aligned = align::align(image, pattern, &view, expectation.doubt_px)?;
+        let view = view.shifted(&self.camera, aligned.shift_px)?;
+        let blur_cells = view.cells_per_px.map(|cells| START_BLUR_PX * cells);
+        let start = Appearance {
+            cells_from_local: view.cells_from_local,
+            black: aligned.black,
+            contrast: aligned.white - aligned.black,
+            blur_cells,
+            correlation: view.correlation,
+        };
+        let step = ((view.side_px / ROWS) as usize).max(1);
+        sample::collect(image, pattern, &view, &self.rays, &start, step, &mut self.row, &mut self.samples);
+        // A thousandth of a pixel on a tag of forty.
+        let effort = Effort { max_steps: 5, settled_cells: 2e-4 };
+        let fit = self.samples.fit(pattern, &start, effort).ok_or(Refusal::Misfit)?;
+        self.judge(image, pattern, &view, &fit)
+    }
+
+    /// Whether what was fitted is the tag, and where its corners are.
+    fn judge(
+        &self,
+        image: &GrayImage,
+        pattern: &Pattern,
+        view: &View,
+        fit: &Fit,
+    ) -> Result<Reading, Refusal> {
+        let appearance = &fit.appearance;
+        if appearance.contrast < LEAST_CONTRAST {
+            return Err(Refusal::Contrast);
+        }
+        if fit.noise > MOST_RESIDUAL * appearance.contrast {
+            return Err(Refusal::Misfit);
+        }
+        let fitted = view.fitted(&self.camera, &appearance.cells_from_local)?;
+        let moved_px = (fitted.middle_px - view.middle_px).norm();
+        if moved_px * view.cells_per_px[0].max(view.cells_per_px[1]) > FARTHEST_CELLS {
+            return Err(Refusal::Misfit);
+        }
+        let threshold = appearance.black + 0.5 * appearance.contrast;
+        let wrong_cells = align::wrong_cells(image, pattern, &fitted, threshold);
+        if wrong_cells > align::MOST_WRONG_CELLS {
+            return Err(Refusal::Cells);
+        }
+        let (corners_px, covariance_px2) = corners(&self.camera, view, fit).ok_or(Refusal::Misfit)?;
+        let sigma_px = |axis: usize| appearance.blur_cells[axis] / view.cells_per_px[axis] / BLUR_SIGMAS;
+        Ok(Reading {
+            corners_px,
+            covariance_px2,
+            contrast: appearance.contrast,
+            noise: fit.noise,
+            blur_px: [sigma_px(0), sigma_px(1)],
+            wrong_cells,
+        })
+    }
+}
+
+/// How a tag lies in the image.
+#[derive(Debug, Clone, Copy)]
+struct View {
+    /// See [`Expectation`].
+    ideal_from_cells: Matrix3<f64>,
+    /// The tag's middle in the ideal image, and half its side there: the local coordinates.
+    origin: Vector2<f64>,
+    unit: f64,
+    /// By rows; the last number is 1.
+    cells_from_local: [f64; 9],
+    /// Outer corners of the white margin: (0, 0), (10, 0), (10, 10), (0, 10) in cells.
+    margin_px: [Point2<f64>; 4],
+    middle_px: Point2<f64>,
+    /// Length of the gradients of u and v in the image.
+    cells_per_px: [f64; 2],
+    /// Cosine of the angle between these gradients.
+    correlation: f64,
+    /// The shorter side of the black square.
+    side_px: f64,
+}
+
+impl View {
+    fn new(camera: &Camera, ideal_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+        /// The outer corners of the white margin.
+        const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+        let ideal = |[u, v]: [f64; 2]| {
+            let p = ideal_from_cells * Vector3::new(u, v, 1.0);
+            (p.z > 0.0).then(|| Vector2::new(p.x / p.z, p.y / p.z))
+        };
+        let pixel = |cell: [f64; 2]| ideal(cell).map(|ideal| camera.pixel_of_ideal(ideal));
+        let [Some(a), Some(b), Some(c), Some(d)] = MARGIN.map(pixel) else { return Err(Refusal::Outside) };
+        let margin_px = [a, b, c, d];
+        if !margin_px.iter().all(|corner| camera.contains(corner)) {
+            return Err(Refusal::Outside);
+        }
+        let origin = ideal([MIDDLE, MIDDLE]).ok_or(Refusal::Outside)?;
+        let along_u = ((b - a) + (c - d)) / 20.0;
+        let along_v = ((d - a) + (c - b)) / 20.0;
+        let side_px = 8.0 * along_u.norm().min(along_v.norm());
+        let area = along_u.perp(&along_v);
+        if side_px < LEAST_SIDE_PX || area < 0.1 * along_u.norm() * along_v.norm() {
+            return Err(Refusal::Small);
+        }
+        let ends = MARGIN.map(ideal);
+        let reach = ends.into_iter().flatten().map(|end| (end - origin).norm()).fold(0.0, f64::max);
+        let local_from_ideal = Matrix3::new(
+            1.0 / reach,
+            0.0,
+            -origin.x / reach,
+            0.0,
+            1.0 / reach,
+            -origin.y / reach,
+            0.0,
+            0.0,
+            1.0,
+        );
+        let inverse = (local_from_ideal * ideal_from_cells).try_inverse().ok_or(Refusal::Small)?;
+        let scale = 1.0 / inverse[(2, 2)];
+        let cells_from_local = std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale);
+        Ok(Self {
+            ideal_from_cells: *ideal_from_cells,
+            origin,
+            unit: reach,
+            cells_from_local,
+            margin_px,
+            middle_px: camera.pixel_of_ideal(origin),
+            cells_per_px: [along_v.norm() / area, along_u.norm() / area],
+            // The gradient of u stands across the lines of equal u, which run along v; and the other way round.
+            correlation: -along_u.dot(&along_v) / (along_u.norm() * along_v.norm()),
+            side_px,
+        })
+    }
+
+    /// The same tag moved in the image.
+    fn shifted(&self, camera: &Camera, shift_px: Vector2<f64>) -> Result<Self, Refusal> {
+        if shift_px == Vector2::zeros() {
+            return Ok(*self);
+        }
+        let moved = camera.unproject(&(self.middle_px + shift_px)).xy() - self.origin;
+        let shift = Matrix3::new_translation(&moved);
+        Self::new(camera, &(shift * self.ideal_from_cells))
+    }
+
+    /// The tag as it was fitted in this view's local coordinates.
+    fn fitted(&self, camera: &Camera, cells_from_local: &[f64; 9]) -> Result<Self, Refusal> {
+        let cells_from_local = Matrix3::from_row_slice(cells_from_local);
+        let ideal_from_local =
+            Matrix3::new(self.unit, 0.0, self.origin.x, 0.0, self.unit, self.origin.y, 0.0, 0.0, 1.0);
+        let mut ideal_from_cells =
+            ideal_from_local * cells_from_local.try_inverse().ok_or(Refusal::Misfit)?;
+        if ideal_from_cells[(2, 2)] < 0.0 {
+            ideal_from_cells = -ideal_from_cells;
+        }
+        Self::new(camera, &ideal_from_cells)
+    }
+
+    /// The pixel of a cell coordinate, good to a fraction of a pixel: the margin's corners interpolated.
+    #[inline]
+    fn rough_px(&self, u: f64, v: f64) -> Point2<f64> {
+        let [a, b, c, d] = &self.margin_px;
+        let (s, t) = (u / 10.0, v / 10.0);
+        let upper = a.coords * (1.0 - s) + b.coords * s;
+        let lower = d.coords * (1.0 - s) + c.coords * s;
+        Point2::from(upper * (1.0 - t) + lower * t)
+    }
+}
+
+/// Corners in pixels and their covariance, from the fitted homography.
+fn corners(camera: &Camera, view: &View, fit: &Fit) -> Option<([Point2<f64>; 4], CornerCovariance)> {
+    let g = &fit.appearance.cells_from_local;
+    let local_from_cells = Matrix3::from_row_slice(g).try_inverse()?;
+    let mut corners_px = [Point2::origin(); 4];
+    let mut jacobian = SMatrix::<f64, 8, 8>::zeros();
+    for (k, [u, v]) in CORNERS.into_iter().enumerate() {
+        let p = local_from_cells * Vector3::new(u, v, 1.0);
+        let (x, y) = (p.x / p.z, p.y / p.z);
+        let w = g[6] * x + g[7] * y + g[8];
+        // d(u, v) / d(x, y), and d(u, v) / dG: a change of G is made good by moving (x, y).
+        let by_local = Matrix2::new(g[0] - u * g[6], g[1] - u * g[7], g[3] - v * g[6], g[4] - v * g[7]) / w;
+        let by_g = SMatrix::<f64, 2, 8>::from_rows(&[
+            nalgebra::RowSVector::from([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y]),
+            nalgebra::RowSVector::from([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]),
+        ]) / w;
+        let ideal = view.origin + Vector2::new(x, y) * view.unit;
+        let (pixel, by_ideal) = camera.pixel_of_ideal_with_jacobian(ideal);
+        corners_px[k] = pixel;
+        let by_g = by_ideal * view.unit * (-by_local.try_inverse()? * by_g);
+        jacobian.fixed_view_mut::<2, 8>(2 * k, 0).copy_from(&by_g);
+    }
+    let covariance = jacobian * fit.covariance * jacobian.transpose();
+    let sane = corners_px.iter().all(|corner| corner.coords.iter().all(|c| c.is_finite()))
+        && covariance.iter().all(|number| number.is_finite());
+    sane.then_some((corners_px, (covariance + covariance.transpose()) * 0.5))
+}
+
+#[cfg(test)]
+mod tests;
