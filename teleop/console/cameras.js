@@ -26,11 +26,12 @@ export function makeCameras(parent) {
     if (it.busy) return;
     it.busy = true;
     try {
+      // Another machine's images stay there: only what was found in them comes.
+      const bitmap = jpeg.size ? await createImageBitmap(jpeg) : null;
+      // From here on without a pause: setting the size clears the picture.
       [canvas.width, canvas.height] = [head.width / 2, head.height / 2];
       const ctx = canvas.getContext('2d');
-      // Another machine's images stay there: only what was found in them comes.
-      if (jpeg.size) {
-        const bitmap = await createImageBitmap(jpeg);
+      if (bitmap) {
         ctx.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
         bitmap.close();
       }

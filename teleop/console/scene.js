@@ -44,10 +44,10 @@ function targetFrame() {
 }
 
 /** Where the operator's room is drawn: at the robot's left, turned to face the same way. */
-const ROOM = { at: [-0.15, 0.85, 0.02], scale: 0.5 }; // a person is four times as tall as the robot
+const ROOM = { at: [0, 0.7, -0.1], scale: 0.5 }; // a person is four times as tall as the robot
 const VIEWS = {
   both: { from: [1.45, -0.95, 0.8], to: [0.1, 0.16, 0.22] },
-  operator: { from: [1.25, -0.35, 1.1], to: [0.06, 0.85, 0.58] },
+  operator: { from: [0.62, 0.12, 0.86], to: [0.2, 0.7, 0.5] },
 };
 
 export async function makeScene(canvas) {

@@ -18,8 +18,9 @@ pub const SILENT_NS: u64 = 500_000_000;
 #[derive(Debug, Clone, Copy, Default)]
 struct Known {
     group: usize,
-    /// Frames here that are still to be read: the newest two (one that is being read, one that waits).
-    in_flight_ns: [Option<u64>; 2],
+    /// Frames here that are still to be read: one that is being read, one that waits, and one that has come and
+    /// displaces that.
+    in_flight_ns: [Option<u64>; 3],
     /// Capture time of the newest reading.
     read_ns: u64,
     /// When it was last heard of.
@@ -56,7 +57,12 @@ impl Gather {
     pub fn arrived(&mut self, camera: usize, capture_ns: u64, now_ns: u64) {
         let Some(known) = self.cameras.get_mut(camera) else { return };
         known.heard_ns = Some(now_ns);
-        known.in_flight_ns = [known.in_flight_ns[1].or(known.in_flight_ns[0]), Some(capture_ns)];
+        let free = known.in_flight_ns.iter_mut().find(|place| place.is_none());
+        match free {
+            Some(place) => *place = Some(capture_ns),
+            // Cannot be, as long as who displaces says so.
+            None => known.in_flight_ns[2] = Some(capture_ns),
+        }
     }
 
     /// A frame will not be read.
@@ -215,6 +221,20 @@ mod tests {
         sut.arrived(1, 133 * MS, 134 * MS);
         sut.displaced(1, 100 * MS);
         assert_eq!(popped(&mut sut), [(0, 100)]);
+    }
+
+    #[test]
+    fn a_frame_that_is_being_read_is_waited_for_while_others_come_and_are_displaced() {
+        let mut sut = sut();
+        for (camera, ms) in [(0, 100), (1, 100), (1, 133), (1, 166)] {
+            sut.arrived(camera, ms * MS, (ms + 1) * MS);
+        }
+        sut.displaced(1, 133 * MS);
+        sut.read(reading(0, 100), 170 * MS);
+        sut.wait_over(180 * MS);
+        assert_eq!(popped(&mut sut), []);
+        sut.read(reading(1, 100), 181 * MS);
+        assert_eq!(popped(&mut sut), [(0, 100), (1, 100)]);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::time::Duration;
 use locoman_protocol::Sender;
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{self, Header};
-use locoman_vision::track::{CameraUpdate, Fusion, TrackUpdate};
+use locoman_vision::track::{Fusion, TrackUpdate};
 
 use crate::board::Board;
 use crate::gather::{Gather, SILENT_NS};
@@ -72,7 +72,11 @@ impl Solver {
                 }
                 Ok(Sighting::Displaced { camera, capture_ns }) => self.gather.displaced(camera, capture_ns),
                 Ok(Sighting::Read(reading)) => self.gather.read(*reading, monotonic_ns()),
-                Ok(Sighting::Searched(found)) => self.found(*found),
+                Ok(Sighting::Searched(found)) => {
+                    if self.fusion.found(*found) {
+                        self.tell(monotonic_ns());
+                    }
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
@@ -90,17 +94,6 @@ impl Solver {
         let wait = self.gather.deadline_ns().map(|at| Duration::from_nanos(at.saturating_sub(now_ns)));
         // What has not come by its deadline and is being read here may take a little longer.
         wait.map_or(NAP, |wait| wait.clamp(Duration::from_millis(1), NAP))
-    }
-
-    /// What the scout saw of shells that are lost.
-    fn found(&mut self, mut found: CameraUpdate) {
-        let motions = self.fusion.motions();
-        let known = motions.known_at(found.capture_ns);
-        found.tags.retain(|seen| known.get(seen.shell) == Some(&false));
-        if !found.tags.is_empty() {
-            let _ = self.fusion.update(vec![found]);
-            self.tell(monotonic_ns());
-        }
     }
 
     fn solve(&mut self, readings: Vec<Reading>, published_ns: &mut u64) {

@@ -50,7 +50,7 @@ pub(super) fn residuals(path: &Path, tally: &Tally, rig: &Rig) -> Result<()> {
 pub(super) fn coverage(path: &Path, tally: &Tally, rig: &Rig) -> Result<()> {
     panels(path, rig, &tally.cameras, |panel, id, (width, height), camera| {
         let mut chart = ChartBuilder::on(panel)
-            .caption(format!("{id}: corners in the image, px"), (FONT, 15))
+            .caption(format!("{id}: corners in the image; orange: beyond three times the RMS"), (FONT, 15))
             .margin(8)
             .x_label_area_size(26)
             .y_label_area_size(44)
@@ -95,7 +95,11 @@ pub(super) fn time(path: &Path, tally: &Tally, shells: &ShellSet) -> Result<()> 
         let jumps = tally.jumps.iter();
         chart.draw_series(jumps.map(|jump| Cross::new((seconds(jump.time_ns), 0.02), 5, colour.filled())))?;
     }
-    chart.configure_series_labels().background_style(WHITE.mix(0.8)).draw()?;
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .draw()?;
     durations(&below, tally)?;
     area.present().with_context(|| format!("cannot write {}", path.display()))
 }
