@@ -35,11 +35,11 @@ use crate::shells::ShellSet;
 use crate::source::FrameSet;
 pub use admission::Dropped;
 pub use eye::Eye;
-pub use filter::{FilterSettings, Manoeuvre, Motion};
+pub use filter::{FilterSettings, Manoeuvre, Matrix18, Motion};
 pub use fusion::{Fusion, Motions};
 pub use scout::Scout;
 pub use settings::TrackerSettings;
-pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TrackUpdate, Verdict};
+pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};
 
 /// Follows all shells of a set with all cameras of a rig, one set of frames after the other.
 #[derive(Debug)]

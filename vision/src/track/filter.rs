@@ -20,7 +20,8 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3};
 
 use crate::pose::{Matrix12, Prior, Solution, State, Vector12};
 
-type Matrix18 = SMatrix<f64, 18, 18>;
+/// Covariance of the whole state.
+pub type Matrix18 = SMatrix<f64, 18, 18>;
 
 /// How an acceleration behaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,8 +73,9 @@ pub struct Motion {
     /// Angular acceleration, shell axes, rad/s².
     pub angular_rad_s2: Vector3<f64>,
     /// What the data made of the variances of both accelerations, as a factor.
-    variance: [f64; 2],
-    covariance: Matrix18,
+    pub variance: [f64; 2],
+    /// Covariance of position, rotation, velocity, angular velocity, acceleration, angular acceleration.
+    pub covariance: Matrix18,
 }
 
 /// What a solve says of pose and twist at one instant, apart from what was believed before: a normal
