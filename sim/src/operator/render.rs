@@ -106,6 +106,7 @@ impl Area {
                 probes[at] = Probe::new(pace.unwrap_or(Pace::Still), trace);
             }
         }
+        let mut near = Candidates::default();
         for row in self.top..self.bottom {
             for column in self.left..self.right {
                 let at = (row - self.top) * stride + column - self.left;
@@ -117,7 +118,8 @@ impl Area {
                     Uniform::Surface(mean) if agree => *pixel = mean,
                     _ => {
                         let rays = exposure.rays.pixel(column, row);
-                        *pixel = sampled(exposure, tile, &rays, (column, row), *pixel);
+                        exposure.view.narrow(tile, &rays.corners(), &mut near);
+                        *pixel = sampled(exposure, &near, &rays, (column, row), *pixel);
                     }
                 }
             }
@@ -245,7 +247,7 @@ fn uniform<'a>(hits: impl Iterator<Item = &'a Option<Hit>>) -> Uniform {
 /// The mean of 16 samples, one in each cell of a 4 x 4 grid, each at another slice of the exposure.
 fn sampled(
     exposure: &Exposure<'_>,
-    tile: &Candidates,
+    among: &Candidates,
     rays: &PixelRays,
     (column, row): (usize, usize),
     behind: f32,
@@ -261,7 +263,7 @@ fn sampled(
         let x = ((cell % GRID) as f32 + jitter(random)) / GRID as f32;
         let y = ((cell / GRID) as f32 + jitter(random >> 16)) / GRID as f32;
         let slice = (order / (GRID * GRID / SLICES) + turn) % SLICES;
-        let hit = exposure.view.trace(tile, rays.at(x, y), row, slice, exposure.lamp);
+        let hit = exposure.view.trace(among, rays.at(x, y), row, slice, exposure.lamp);
         sum += hit.map_or(behind, |hit| hit.light);
     }
     sum / (GRID * GRID) as f32

@@ -50,6 +50,14 @@ struct Place {
     lamp: Lamp,
 }
 
+/// What a camera sees whatever the scene: the costly part of a studio.
+struct Drawn {
+    camera: Camera,
+    rays: Arc<RayTable>,
+    background: Arc<Vec<f32>>,
+    sync_group: usize,
+}
+
 /// A picture of 8 bit grey levels, by rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
@@ -91,7 +99,7 @@ impl Studio {
         let drawn = rig.cameras.iter().zip(&rig.sync_groups).map(|(camera, sync_group)| {
             let rays = Arc::new(RayTable::new(camera));
             let background = Arc::new(room::background(camera, &rays, seed));
-            (camera.clone(), rays, background, *sync_group)
+            Drawn { camera: camera.clone(), rays, background, sync_group: *sync_group }
         });
         Self::with_drawn(drawn.collect(), shells.clone(), scene, seed)
     }
@@ -99,33 +107,28 @@ impl Studio {
     /// The same cameras, shells and room with another scene: cheaper than to draw the room again.
     pub fn with_scene(&self, scene: Scene) -> Result<Self, StudioError> {
         let drawn = self.stands.iter().map(|stand| {
-            let Place { camera, background, .. } = &stand.place;
-            (camera.clone(), stand.rays.clone(), background.clone(), stand.sync_group)
+            let Place { camera, background, .. } = stand.place.clone();
+            Drawn { camera, rays: stand.rays.clone(), background, sync_group: stand.sync_group }
         });
         Self::with_drawn(drawn.collect(), self.shells.clone(), scene, self.seed)
     }
 
-    fn with_drawn(
-        drawn: Vec<(Camera, Arc<RayTable>, Arc<Vec<f32>>, usize)>,
-        shells: ShellSet,
-        scene: Scene,
-        seed: u64,
-    ) -> Result<Self, StudioError> {
-        let ids = || drawn.iter().map(|(camera, ..)| camera.id.as_str());
+    fn with_drawn(drawn: Vec<Drawn>, shells: ShellSet, scene: Scene, seed: u64) -> Result<Self, StudioError> {
+        let ids = || drawn.iter().map(|drawn| drawn.camera.id.as_str());
         let named = scene.cameras.iter().map(|phase| phase.id.as_str()).chain(scene.events.cameras());
         if let Some(id) = named.into_iter().find(|id| !ids().any(|known| known == *id)) {
             let known = ids().collect::<Vec<_>>().join(", ");
             return Err(StudioError::Camera { id: id.to_owned(), known });
         }
         let groups: Vec<(&str, usize)> =
-            drawn.iter().map(|(camera, _, _, group)| (camera.id.as_str(), *group)).collect();
+            drawn.iter().map(|drawn| (drawn.camera.id.as_str(), drawn.sync_group)).collect();
         let phases = phases(&scene, &groups)?;
         let chest = Point3::from(scene.motion.posture(0.0).of(Body::Torso).translation.vector);
         let lamp = |camera: &Camera| Lamp::new(&scene.light, &camera.world_from_camera.inverse(), &chest);
         let stands = drawn
             .into_iter()
             .zip(phases)
-            .map(|((camera, rays, background, sync_group), phase_s)| {
+            .map(|(Drawn { camera, rays, background, sync_group }, phase_s)| {
                 let (width, height) = (camera.width as usize, camera.height as usize);
                 let bumps = scene.events.bump.iter().filter(|bump| bump.camera == camera.id);
                 let bumped = bumps

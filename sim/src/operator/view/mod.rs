@@ -122,6 +122,20 @@ impl View {
         self.facets.get(usize::from(facet)).map_or(Pace::Still, |facet| facet.passage.pace)
     }
 
+    /// Leaves of some candidates those that a pixel with these corners may show.
+    pub fn narrow(&self, among: &Candidates, corners: &[Ray; 4], narrowed: &mut Candidates) {
+        let pixel = Window::of_rays(corners);
+        let limbs = &self.bands[among.band];
+        let facets = &self.facets;
+        let facet_meets = |number: &u16| facets[usize::from(*number)].passage.window.meets(&pixel);
+        let limb_meets = |number: &u16| limbs[usize::from(*number)].window.meets(&pixel);
+        narrowed.facets.clear();
+        narrowed.facets.extend(among.facets.iter().copied().filter(facet_meets));
+        narrowed.limbs.clear();
+        narrowed.limbs.extend(among.limbs.iter().copied().filter(limb_meets));
+        narrowed.band = among.band;
+    }
+
     /// The nearest hit of a ray in a slice of the exposure of a row.
     #[inline]
     pub fn trace(&self, among: &Candidates, ray: Ray, row: usize, slice: usize, lamp: &Lamp) -> Option<Hit> {

@@ -57,4 +57,25 @@ impl Window {
     pub(super) fn holds(&self, [x, y]: Ray) -> bool {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
+
+    /// Of a pixel with these corners.
+    pub(super) fn of_rays(corners: &[Ray; 4]) -> Self {
+        let mut window = Self::NONE;
+        for [x, y] in corners {
+            window.left = window.left.min(*x);
+            window.right = window.right.max(*x);
+            window.top = window.top.min(*y);
+            window.bottom = window.bottom.max(*y);
+        }
+        window
+    }
+
+    /// Whether the two have a ray in common.
+    #[inline]
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.left <= other.right
+            && other.left <= self.right
+            && self.top <= other.bottom
+            && other.top <= self.bottom
+    }
 }
