@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_drifting_clock_is_followed_and_its_drift_told() {
-        let other = Other { offset_ns: -3e12, drift_ppm: 18.0 };
+        let other = Other { offset_ns: -5e11, drift_ppm: 18.0 };
         let mut sut = OffsetEstimator::default();
         for k in 0..600 {
             let delay_ns = 100_000 + (k * 7919) % 400_000;
