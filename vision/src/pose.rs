@@ -226,7 +226,7 @@ impl Solver {
     fn afresh_prepared(&mut self, views: &Views<'_>, settings: &SolverSettings) -> Result<Solution, Refusal> {
         let prior_at = |pose| Prior::of_speed(pose, settings.free_speed_m_s, settings.free_rate_rad_s);
         let mut found: Vec<(Minimum, Solution, Vec<Fate>)> = Vec::new();
-        let mut refusal = Refusal::NothingSeen;
+        let mut refusal = self.nothing();
         for start in self.hypotheses(views) {
             let prior = prior_at(start);
             let Some(minimum) = self.work.refine(views, &prior.state, &prior, settings) else { continue };
@@ -243,6 +243,11 @@ impl Solver {
         }
         self.work.fates = fates;
         Ok(solution)
+    }
+
+    /// Why there is no minimum: nothing was usable, or what was contradicts itself.
+    fn nothing(&self) -> Refusal {
+        if self.work.used_count() == 0 { Refusal::NothingSeen } else { Refusal::NothingAgrees }
     }
 
     /// Start poses, the best first.
@@ -265,24 +270,20 @@ impl Solver {
             return Err(Refusal::NothingAgrees);
         }
         let data = &minimum.normal.hessian;
-        let joint = (data + prior.information).cholesky().ok_or(Refusal::NothingAgrees)?;
+        let inverse = |information: Matrix12| information.cholesky().map(|factor| factor.inverse());
+        let mut covariance = inverse(data + prior.information).ok_or(Refusal::NothingAgrees)?;
         // The numbers that the data, not the prior, determine: the trace of the share of their information.
-        let determined = joint.solve(data).trace();
+        let determined = 12.0 - covariance.dot(&prior.information);
         let freedom = (8.0 * used as f64 - determined).max(1.0);
         let excess = self.work.chi2() / freedom;
         // By chance χ² exceeds its mean by three standard deviations once in several hundred solves.
         let widening = (excess / (1.0 + 3.0 * (2.0 / freedom).sqrt())).max(1.0);
         let information = data / widening;
-        let covariance =
-            (information + prior.information).cholesky().ok_or(Refusal::NothingAgrees)?.inverse();
+        if widening > 1.0 {
+            covariance = inverse(information + prior.information).ok_or(Refusal::NothingAgrees)?;
+        }
         if !covariance.iter().all(|number| number.is_finite()) {
             return Err(Refusal::NothingAgrees);
-        }
-        let mut squares_px2 = 0.0;
-        for (term, fate) in self.work.terms.iter().zip(self.fates()) {
-            if let (Some(term), Fate::Used) = (term, fate) {
-                squares_px2 += term.squares_px2(views, &minimum.state).unwrap_or(f64::INFINITY);
-            }
         }
         Ok(Solution {
             state: minimum.state,
@@ -291,7 +292,7 @@ impl Solver {
             gradient: minimum.normal.gradient / widening,
             excess,
             freedom,
-            rms_px: (squares_px2 / (4.0 * used as f64)).sqrt(),
+            rms_px: (self.work.squares_px2() / (4.0 * used as f64)).sqrt(),
             tags: self.distinct(views, |observation| observation.tag),
             cameras: self.distinct(views, |observation| observation.camera),
         })

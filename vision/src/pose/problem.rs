@@ -5,10 +5,10 @@
 //! k grows with the lower median of s: while the start is far off, nothing fades; where sigma promises too
 //! much, everything is allowed more.
 
-use nalgebra::SVector;
+use nalgebra::Matrix3;
 
 use super::state::{Matrix12, Prior, State, Vector12};
-use super::term::{BEHIND, Linear, Term, View};
+use super::term::{BEHIND, Linear, RESIDUAL, Term, View};
 use super::{Fate, Observation, SolverSettings, Views};
 
 /// Median of χ² with eight degrees of freedom.
@@ -45,10 +45,10 @@ impl Workspace {
         self.eyes.clear();
         self.eyes.extend(views.cameras.iter().map(View::new));
         self.terms.clear();
-        let term = |o: &Observation| Term::new(views, o, settings.corner_floor_px, views.variance);
+        let term = |o: &Observation| Term::new(views, o, settings.corner_floor_px);
         self.terms.extend(views.observations.iter().map(term));
-        self.here.resize_with(self.terms.len(), Linear::new);
-        self.trial.resize_with(self.terms.len(), Linear::new);
+        self.here.resize_with(self.terms.len(), Linear::behind);
+        self.trial.resize_with(self.terms.len(), Linear::behind);
         self.include_all();
     }
 
@@ -89,7 +89,7 @@ impl Workspace {
         self.include_all();
         let mut minimum = self.minimize(views, start, prior, settings)?;
         for _ in 0..ROUNDS {
-            if !self.judge(views, &minimum.state, settings) {
+            if !self.judge(settings) {
                 break;
             }
             minimum = self.minimize(views, &minimum.state, prior, settings)?;
@@ -110,13 +110,13 @@ impl Workspace {
         const DOWN: f64 = 0.1;
         const UP: f64 = 8.0;
         const GIVE_UP: f64 = 1e8;
-        /// A step that lowers the cost by less changes nothing: a ten-thousandth of a standard deviation.
-        const CONVERGED: f64 = 1e-8;
+        /// A step that promises to lower the cost by less is not worth it: a thousandth of a standard deviation.
+        const CONVERGED: f64 = 1e-6;
         let mut state = *start;
         let mut damping = 0.0;
         Self::linearize(&self.terms, &self.eyes, views, &state, &mut self.here);
         let mut limit = self.kernel_limit(settings)?;
-        let mut normal = self.normal(limit);
+        let mut normal = self.normal(&state, limit);
         for _ in 0..settings.max_steps {
             let (prior_hessian, prior_gradient) = prior.linearized(&state);
             let gradient = normal.gradient + prior_gradient;
@@ -133,22 +133,24 @@ impl Workspace {
                 continue;
             };
             let step = -cholesky.solve(&gradient);
+            if -step.dot(&gradient) < CONVERGED {
+                break;
+            }
             let moved = state.moved(&step);
             Self::linearize(&self.terms, &self.eyes, views, &moved, &mut self.trial);
             let before = self.cost(&self.here, limit) + prior.distance2(&state);
             let after = self.cost(&self.trial, limit) + prior.distance2(&moved);
-            let promised = -step.dot(&gradient);
             if after <= before {
                 state = moved;
                 std::mem::swap(&mut self.here, &mut self.trial);
                 damping = if damping > FIRST { damping * DOWN } else { 0.0 };
                 limit = self.kernel_limit(settings)?;
-                normal = self.normal(limit);
+                normal = self.normal(&state, limit);
             } else {
                 damping = f64::max(damping * UP, FIRST);
-            }
-            if promised < CONVERGED || damping > GIVE_UP {
-                break;
+                if damping > GIVE_UP {
+                    break;
+                }
             }
         }
         let cost = self.cost(&self.here, limit) + prior.distance2(&state);
@@ -164,7 +166,7 @@ impl Workspace {
     ) {
         for (term, linear) in terms.iter().zip(into) {
             if let Some(term) = term {
-                term.linearize(views, eyes, state, linear);
+                *linear = term.linearize(views, eyes, state);
             }
         }
     }
@@ -190,50 +192,78 @@ impl Workspace {
     }
 
     /// Σ w JᵀJ and Σ w Jᵀr of what counts, with the kernel's weights w.
-    fn normal(&self, limit: f64) -> Normal {
-        let mut hessian = Matrix12::zeros();
-        let mut gradient = Vector12::zeros();
+    ///
+    /// From the products of six columns, times 1 for the pose, dt for the mixed part and dt² for the twist.
+    fn normal(&self, state: &State, limit: f64) -> Normal {
+        let mut sums = [[[0.0; 8]; 8]; 3];
         for k in self.used() {
-            let Linear { residual, jacobian, squared } = &self.here[k];
+            let (Linear { products, squared, .. }, Some(term)) = (&self.here[k], &self.terms[k]) else {
+                continue;
+            };
             if *squared >= BEHIND {
                 continue;
             }
             let weight = if *squared > limit { limit / squared } else { 1.0 };
-            for j in 0..12 {
-                let column: SVector<f64, 8> = jacobian.column(j) * weight;
-                for i in 0..=j {
-                    hessian[(i, j)] += jacobian.column(i).dot(&column);
+            let factors = [weight, weight * term.dt_s, weight * term.dt_s * term.dt_s];
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                for (sum, row) in sum.iter_mut().zip(products).take(RESIDUAL) {
+                    for (sum, value) in sum.iter_mut().zip(row) {
+                        *sum += factor * value;
+                    }
                 }
-                gradient[j] += residual.dot(&column);
             }
         }
+        // From rotations about world axes to those about shell axes.
+        let rotation = state.world_from_shell.rotation.to_rotation_matrix().into_inner();
+        let mut hessian = Matrix12::zeros();
+        let mut gradient = Vector12::zeros();
+        for (place, sum) in [(0, 0), (0, 6), (6, 6)].into_iter().zip(&sums) {
+            let block = |i: usize, j: usize| Matrix3::from_fn(|r, c| sum[3 * i + r][3 * j + c]);
+            let mut put = |i: usize, j: usize, value: Matrix3<f64>| {
+                hessian.fixed_view_mut::<3, 3>(place.0 + 3 * i, place.1 + 3 * j).copy_from(&value);
+            };
+            let mixed = block(0, 1) * rotation;
+            put(0, 0, block(0, 0));
+            put(0, 1, mixed);
+            put(1, 0, mixed.transpose());
+            put(1, 1, rotation.tr_mul(&(block(1, 1) * rotation)));
+        }
         hessian.fill_lower_triangle_with_upper_triangle();
+        for (first, sum) in [0, 6].into_iter().zip(&sums) {
+            let part = |i: usize| nalgebra::Vector3::from_fn(|r, _| sum[3 * i + r][RESIDUAL]);
+            gradient.fixed_rows_mut::<3>(first).copy_from(&part(0));
+            gradient.fixed_rows_mut::<3>(first + 3).copy_from(&rotation.tr_mul(&part(1)));
+        }
         Normal { hessian, gradient }
     }
 
-    /// χ² of what counts at the minimum, each tag at most what the kernel lets it.
+    /// Sum of the squared residual lengths of what counts, at the minimum, pixels.
+    pub fn squares_px2(&self) -> f64 {
+        self.used().map(|k| self.here[k].squared_px2).sum()
+    }
+
+    /// χ² of what counts, at the minimum.
     pub fn chi2(&self) -> f64 {
         self.used().map(|k| self.here[k].squared).sum()
     }
 
-    /// Says of each observation whether it fits a state; whether anything changed.
-    fn judge(&mut self, views: &Views<'_>, state: &State, settings: &SolverSettings) -> bool {
+    /// Says of each observation whether it fits the minimum; whether anything changed.
+    fn judge(&mut self, settings: &SolverSettings) -> bool {
         /// With fewer tags the median says nothing of the noise: one of them may be false.
         const ENOUGH: usize = 3;
         let scale2 = if self.used_count() < ENOUGH { 1.0 } else { self.scale2().unwrap_or(1.0) };
         let limit = settings.outlier_chi2 * scale2;
         let mut changed = false;
-        for (k, term) in self.terms.iter().enumerate() {
-            let Some(term) = term else { continue };
-            let squared = self.here[k].squared;
-            let fits = squared <= limit || {
-                let rms_px = term.squares_px2(views, state).map(|sum| (sum / 4.0).sqrt());
-                rms_px.is_some_and(|rms_px| rms_px < settings.outlier_floor_px)
+        for k in 0..self.terms.len() {
+            let (Some(_), Linear { squared, squared_px2, faces, .. }) = (&self.terms[k], &self.here[k])
+            else {
+                continue;
             };
-            let fate = match (fits, term.faces(views, state)) {
-                (_, false) => Fate::FacingAway,
+            let fits = *squared <= limit || *squared_px2 < 4.0 * settings.outlier_floor_px.powi(2);
+            let fate = match (faces, fits) {
+                (false, _) => Fate::FacingAway,
                 (true, true) => Fate::Used,
-                (false, true) => Fate::Outlier,
+                (true, false) => Fate::Outlier,
             };
             changed |= self.fates[k] != fate;
             self.fates[k] = fate;

@@ -96,11 +96,16 @@ impl Prior {
     /// Hessian and gradient of half of [`Prior::distance2`] at a state.
     pub(super) fn linearized(&self, state: &State) -> (Matrix12, Vector12) {
         let step = self.state.step_to(state);
-        let mut jacobian = Matrix12::identity();
         let turn: Vector3<f64> = step.fixed_rows::<3>(3).into();
-        jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&right_jacobian_inverse(&turn));
-        let weighed = jacobian.tr_mul(&self.information);
-        (weighed * jacobian, weighed * step)
+        // Only the rotation's part of the derivative is not 1.
+        let jacobian = right_jacobian_inverse(&turn);
+        let mut hessian = self.information;
+        let rows = jacobian.tr_mul(&hessian.fixed_rows::<3>(3));
+        hessian.fixed_rows_mut::<3>(3).copy_from(&rows);
+        let gradient = hessian * step;
+        let columns = hessian.fixed_columns::<3>(3) * jacobian;
+        hessian.fixed_columns_mut::<3>(3).copy_from(&columns);
+        (hessian, gradient)
     }
 }
 

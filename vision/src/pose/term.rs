@@ -4,186 +4,206 @@
 //! A corner X (shell frame) that camera c, with pose (R_c, t_c), exposed dt after the reference time:
 //!
 //! ```text
-//! y = exp(ω dt) X        r = π(R_cᵀ (R y + p + v dt − t_c)) − z      π: projection with the lens
-//! B = ∂π/∂x_c R_cᵀ       ∂r/∂p = B    ∂r/∂θ = −B R [y]×    ∂r/∂v = dt B    ∂r/∂ω = −dt B R [y]× J_l(ω dt)
+//! y = R exp(ω dt) X      r = π(R_cᵀ (y + p + v dt − t_c)) − z        π: projection with the lens
+//! B = ∂π/∂x_c R_cᵀ       ∂r/∂p = B    ∂r/∂φ = −B [y]×    ∂r/∂v = dt B    ∂r/∂(Rω) = −dt B [y]×
 //! ```
 //!
-//! J_l is the left Jacobian of SO(3). The eight residuals of a tag are multiplied with L⁻¹, where L Lᵀ is the
-//! covariance of its corners plus the floor: what calibration and print leave.
+//! φ is a rotation about world axes: [`super::problem`] turns the sums into shell axes. Two small things are left
+//! out of the derivatives, not of the residuals, where they would move the estimate by thousandths of its
+//! standard deviation: that a tag's corners differ by a millisecond in dt, and the left Jacobian of SO(3) in the
+//! last derivative (ω dt is some hundredths). So all twelve columns follow from six, and what a tag gives to the
+//! normal equations from the 7x7 products of (∂r/∂p, ∂r/∂φ, r), times 1, dt and dt².
+//!
+//! The residuals of a tag are multiplied with L⁻¹, where L Lᵀ is the covariance of its corners plus the floor:
+//! what calibration and print leave.
 
-use nalgebra::{Isometry3, Matrix3, Point2, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, UnitQuaternion, Vector3};
 
 use super::state::State;
 use super::{Observation, Views};
 use crate::camera::Camera;
-use crate::detect::CornerCovariance;
 
 /// Squared residual of a tag that a pose puts behind the camera.
 pub(super) const BEHIND: f64 = 1e8;
+/// The column of the residual among the products.
+pub(super) const RESIDUAL: usize = 6;
 
 /// A camera as the solver needs it.
 #[derive(Debug, Clone)]
 pub(super) struct View {
-    camera_from_world: Isometry3<f64>,
-    rotation: Matrix3<f64>,
+    camera_from_world: Matrix3<f64>,
+    eye: Vector3<f64>,
 }
 
 impl View {
     pub fn new(camera: &Camera) -> Self {
-        let camera_from_world = camera.world_from_camera.inverse();
-        Self { rotation: camera_from_world.rotation.to_rotation_matrix().into_inner(), camera_from_world }
+        let world_from_camera = &camera.world_from_camera;
+        Self {
+            camera_from_world: world_from_camera.rotation.inverse().to_rotation_matrix().into_inner(),
+            eye: world_from_camera.translation.vector,
+        }
     }
 }
 
 /// An observation, prepared.
 #[derive(Debug, Clone)]
 pub(super) struct Term {
-    pub camera: usize,
+    camera: usize,
     corners: [Vector3<f64>; 4],
+    normal: Vector3<f64>,
     measured_px: [Point2<f64>; 4],
-    /// When each corner was exposed, after the reference time.
-    dt_s: [f64; 4],
-    /// L⁻¹, lower triangular.
-    whitening: CornerCovariance,
+    /// Mean time of the corners after the reference time,
+    pub dt_s: f64,
+    /// and how much later than it each was exposed.
+    later_s: [f64; 4],
+    whitening: Whitening,
 }
 
 /// A term at one state.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
-    /// Whitened.
-    pub residual: SVector<f64, 8>,
-    /// Whitened, by the tangent.
-    pub jacobian: SMatrix<f64, 8, 12>,
-    /// |residual|², or [`BEHIND`].
+    /// Sums over the eight whitened rows of products of the columns (∂r/∂p, ∂r/∂φ, r, 0).
+    pub products: [[f64; 8]; 8],
+    /// |L⁻¹ r|², or [`BEHIND`].
     pub squared: f64,
+    /// |r|².
+    pub squared_px2: f64,
+    /// Whether the printed side looks at the camera.
+    pub faces: bool,
 }
 
 impl Linear {
-    pub fn new() -> Self {
-        Self { residual: SVector::zeros(), jacobian: SMatrix::zeros(), squared: BEHIND }
+    pub fn behind() -> Self {
+        Self { products: [[0.0; 8]; 8], squared: BEHIND, squared_px2: BEHIND, faces: true }
     }
 }
 
 impl Term {
     /// `None` if the camera or the tag does not exist, or the covariance is none.
-    pub fn new(views: &Views<'_>, observation: &Observation, floor_px: f64, variance: f64) -> Option<Self> {
+    pub fn new(views: &Views<'_>, observation: &Observation, floor_px: f64) -> Option<Self> {
         let camera = views.cameras.get(observation.camera)?;
         let tag = views.shell.tags.get(observation.tag)?;
-        let mut covariance = observation.covariance_px2;
-        for k in 0..8 {
-            covariance[(k, k)] += floor_px * floor_px;
-        }
-        let factor = (covariance * variance).cholesky()?.unpack();
-        let whitening = factor.solve_lower_triangular(&CornerCovariance::identity())?;
-        let since_s = seconds_between(views.time_ns, observation.capture_ns);
+        let whitening = Whitening::new(observation, floor_px, views.variance)?;
+        let since_s = (i128::from(observation.capture_ns) - i128::from(views.time_ns)) as f64 * 1e-9;
+        let delays_s = observation.corners_px.map(|corner| camera.row_delay_s(corner.y));
+        let mean_s = delays_s.iter().sum::<f64>() / 4.0;
         let finite = observation.corners_px.iter().all(|corner| corner.coords.iter().all(|c| c.is_finite()));
         finite.then(|| Self {
             camera: observation.camera,
             corners: tag.corners().map(|corner| corner.coords),
+            normal: tag.normal(),
             measured_px: observation.corners_px,
-            dt_s: observation.corners_px.map(|corner| since_s + camera.row_delay_s(corner.y)),
+            dt_s: since_s + mean_s,
+            later_s: delays_s.map(|delay_s| delay_s - mean_s),
             whitening,
         })
     }
 
     /// Residuals and derivatives at a state.
-    pub fn linearize(&self, views: &Views<'_>, eyes: &[View], state: &State, linear: &mut Linear) {
-        linear.squared = BEHIND;
-        let (Some(camera), Some(eye)) = (views.cameras.get(self.camera), eyes.get(self.camera)) else {
-            return;
-        };
-        let rotation = state.world_from_shell.rotation.to_rotation_matrix().into_inner();
-        let mut residual = SVector::<f64, 8>::zeros();
-        let mut jacobian = SMatrix::<f64, 8, 12>::zeros();
+    pub fn linearize(&self, views: &Views<'_>, eyes: &[View], state: &State) -> Linear {
+        self.try_linearize(views, eyes, state).unwrap_or_else(Linear::behind)
+    }
+
+    fn try_linearize(&self, views: &Views<'_>, eyes: &[View], state: &State) -> Option<Linear> {
+        let (camera, eye) = (views.cameras.get(self.camera)?, eyes.get(self.camera)?);
+        let start = &state.world_from_shell;
+        let turn = UnitQuaternion::from_scaled_axis(state.rate_rad_s * self.dt_s);
+        let rotation = (start.rotation * turn).to_rotation_matrix().into_inner();
+        let position = start.translation.vector + state.velocity_m_s * self.dt_s;
+        let rate_in_world = start.rotation * state.rate_rad_s;
+        let from_eye = position - eye.eye;
+        let mut rows = [[0.0; 8]; 8];
+        let mut squared_px2 = 0.0;
+        let mut first = Vector3::zeros();
         for c in 0..4 {
-            let dt_s = self.dt_s[c];
-            let arc = Arc::new(state.rate_rad_s * dt_s);
-            let turned = arc.turn(&self.corners[c]);
-            let in_world =
-                rotation * turned + state.world_from_shell.translation.vector + state.velocity_m_s * dt_s;
-            let in_camera = Point3::from(eye.rotation * in_world + eye.camera_from_world.translation.vector);
-            let Some((pixel, by_point)) = camera.project_with_jacobian(&in_camera) else { return };
-            let by_position = by_point * eye.rotation;
+            // A corner is at most a millisecond or two later than its tag: two terms of the series are exact.
+            let at_mean = rotation * self.corners[c];
+            let later_s = self.later_s[c];
+            let turning = rate_in_world.cross(&at_mean);
+            let bending = rate_in_world.cross(&turning) * (0.5 * later_s);
+            let shift = (state.velocity_m_s + turning + bending) * later_s;
+            let in_camera = eye.camera_from_world * (at_mean + from_eye + shift);
+            let (pixel, by_point) = camera.project_with_jacobian(&Point3::from(in_camera))?;
+            let by_position = by_point * eye.camera_from_world;
             for axis in 0..2 {
-                let row = 2 * c + axis;
-                residual[row] = pixel[axis] - self.measured_px[c][axis];
-                let by_p: Vector3<f64> = by_position.row(axis).transpose();
-                let by_theta = turned.cross(&rotation.tr_mul(&by_p));
-                let by_omega = arc.left_jacobian_transposed(&by_theta) * dt_s;
-                for k in 0..3 {
-                    jacobian[(row, k)] = by_p[k];
-                    jacobian[(row, 3 + k)] = by_theta[k];
-                    jacobian[(row, 6 + k)] = by_p[k] * dt_s;
-                    jacobian[(row, 9 + k)] = by_omega[k];
+                let by_p =
+                    Vector3::new(by_position[(axis, 0)], by_position[(axis, 1)], by_position[(axis, 2)]);
+                let by_phi = at_mean.cross(&by_p);
+                let residual = pixel[axis] - self.measured_px[c][axis];
+                squared_px2 += residual * residual;
+                rows[2 * c + axis] = [by_p.x, by_p.y, by_p.z, by_phi.x, by_phi.y, by_phi.z, residual, 0.0];
+            }
+            if c == 0 {
+                first = at_mean;
+            }
+        }
+        let products = products(&self.whitening.applied(rows));
+        Some(Linear {
+            squared: products[RESIDUAL][RESIDUAL],
+            products,
+            squared_px2,
+            faces: (rotation * self.normal).dot(&(first + from_eye)) < 0.0,
+        })
+    }
+}
+
+/// Sums over the rows of products of their columns; the last column is 0 and there for the compiler's sake.
+fn products(rows: &[[f64; 8]; 8]) -> [[f64; 8]; 8] {
+    let mut sums = [[0.0; 8]; 8];
+    for row in rows {
+        for (sum, factor) in sums.iter_mut().zip(row).take(RESIDUAL + 1) {
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += factor * value;
+            }
+        }
+    }
+    sums
+}
+
+/// Multiplies rows with L⁻¹, by forward substitution.
+#[derive(Debug, Clone)]
+struct Whitening {
+    /// L below its diagonal,
+    lower: [[f64; 8]; 8],
+    /// and the inverse of its diagonal.
+    inverse_diagonal: [f64; 8],
+}
+
+impl Whitening {
+    /// By Cholesky's decomposition; `None` if the covariance is not positive.
+    fn new(observation: &Observation, floor_px: f64, variance: f64) -> Option<Self> {
+        let mut lower = [[0.0; 8]; 8];
+        let mut inverse_diagonal = [0.0; 8];
+        for i in 0..8 {
+            for j in 0..=i {
+                let floor = if i == j { floor_px * floor_px } else { 0.0 };
+                let mut sum = (observation.covariance_px2[(i, j)] + floor) * variance;
+                for k in 0..j {
+                    sum -= lower[i][k] * lower[j][k];
+                }
+                if i > j {
+                    lower[i][j] = sum * inverse_diagonal[j];
+                } else if sum > 0.0 && sum.is_finite() {
+                    inverse_diagonal[i] = 1.0 / sum.sqrt();
+                } else {
+                    return None;
                 }
             }
         }
-        linear.residual = self.whitening * residual;
-        linear.jacobian = self.whitening * jacobian;
-        linear.squared = linear.residual.norm_squared();
+        Some(Self { lower, inverse_diagonal })
     }
 
-    /// Sum of the squared residual lengths in pixels at a state; `None` behind the camera.
-    pub fn squares_px2(&self, views: &Views<'_>, state: &State) -> Option<f64> {
-        let camera = views.cameras.get(self.camera)?;
-        let mut sum = 0.0;
-        for c in 0..4 {
-            let pose = state.pose_after(self.dt_s[c]);
-            let in_camera = camera.world_from_camera.inverse() * (pose * Point3::from(self.corners[c]));
-            sum += (camera.project(&in_camera)? - self.measured_px[c]).norm_squared();
+    fn applied(&self, mut rows: [[f64; 8]; 8]) -> [[f64; 8]; 8] {
+        for i in 0..8 {
+            let mut row = rows[i];
+            for k in 0..i {
+                let factor = self.lower[i][k];
+                for (value, above) in row.iter_mut().zip(&rows[k]) {
+                    *value -= factor * above;
+                }
+            }
+            rows[i] = row.map(|value| value * self.inverse_diagonal[i]);
         }
-        Some(sum)
+        rows
     }
-
-    /// Whether the printed side looks at the camera.
-    pub fn faces(&self, views: &Views<'_>, state: &State) -> bool {
-        let Some(camera) = views.cameras.get(self.camera) else { return false };
-        let [a, b, _, d] = &self.corners;
-        let pose = state.pose_after(self.dt_s[0]);
-        let eye = pose.inverse() * Point3::from(camera.world_from_camera.translation.vector);
-        (b - a).cross(&(d - a)).dot(&(eye.coords - a)) > 0.0
-    }
-}
-
-/// A rotation vector with what its series have in common.
-struct Arc {
-    phi: Vector3<f64>,
-    /// sin θ / θ, (1 − cos θ) / θ², (θ − sin θ) / θ³.
-    a: f64,
-    b: f64,
-    c: f64,
-}
-
-impl Arc {
-    fn new(phi: Vector3<f64>) -> Self {
-        /// Below this squared angle the next terms of the series are smaller than 1e-11.
-        const SMALL: f64 = 1e-3;
-        let t2 = phi.norm_squared();
-        if t2 < SMALL {
-            let a = 1.0 - t2 / 6.0 * (1.0 - t2 / 20.0 * (1.0 - t2 / 42.0));
-            let b = 0.5 - t2 / 24.0 * (1.0 - t2 / 30.0 * (1.0 - t2 / 56.0));
-            let c = 1.0 / 6.0 - t2 / 120.0 * (1.0 - t2 / 42.0 * (1.0 - t2 / 72.0));
-            return Self { phi, a, b, c };
-        }
-        let t = t2.sqrt();
-        let (sin, cos) = t.sin_cos();
-        Self { phi, a: sin / t, b: (1.0 - cos) / t2, c: (t - sin) / (t2 * t) }
-    }
-
-    /// exp(φ) x.
-    fn turn(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        let once = self.phi.cross(x);
-        x + once * self.a + self.phi.cross(&once) * self.b
-    }
-
-    /// J_l(φ)ᵀ x.
-    fn left_jacobian_transposed(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        let once = self.phi.cross(x);
-        x - once * self.b + self.phi.cross(&once) * self.c
-    }
-}
-
-/// From one time to another, negative backwards.
-fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
-    (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
 }
