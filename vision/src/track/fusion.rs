@@ -104,11 +104,18 @@ impl Fusion {
     pub fn found(&mut self, mut search: CameraUpdate) -> bool {
         let known = self.motions().known_at(search.capture_ns);
         search.tags.retain(|seen| known.get(seen.shell) == Some(&false));
-        let anything = !search.tags.is_empty();
-        if anything {
-            self.update(vec![search]);
+        if search.tags.is_empty() {
+            return false;
         }
-        anything
+        // Not judged by its time: a search takes long, and its image was already taken in by an eye.
+        let mut search = [search];
+        for index in 0..self.order.len() {
+            let shell = self.order[index];
+            if !known[shell] {
+                self.update_shell(shell, self.shells.palm_of(shell), &mut search);
+            }
+        }
+        true
     }
 
     /// Takes in what cameras saw, each at its own time; frames that are late by up to 50 ms included.
