@@ -16,7 +16,10 @@
 //!     │   │                                                       └───────────────┘
 //!     │   │ detections/<camera>      Detections       each frame  ┌───────────────┐
 //!     │   └────────────────────────────────────────────────────── │ camera nodes  │
-//!     │                                                           └───────────────┘
+//!     │          motions                  Motions     each solve  │               │
+//!     │     ────────────────────────────────────────────────────► │               │
+//!     │          clock_ping, clock_pong               5 Hz        │               │
+//!     │     ◄───────────────────────────────────────────────────► └───────────────┘
 //!     └ tracking, event              Tracking, Event              (within the station)
 //! ```
 //!
@@ -25,7 +28,8 @@
 //! | suffix | priority | when the link is full | express | longest |
 //! |---|---|---|---|---|
 //! | `command`, `stop` | real time | drop | yes | 16 KiB |
-//! | `state`, `detections/*` | interactive high | drop | yes | 64 KiB |
+//! | `clock_ping`, `clock_pong` | real time | drop | yes | 256 B |
+//! | `state`, `detections/*`, `motions` | interactive high | drop | yes | 64 KiB |
 //! | `truth` | interactive low | drop | yes | 64 KiB |
 //! | `tracking` | data high | drop | yes | 64 KiB |
 //! | `event` | data low | drop | no | 64 KiB |
@@ -56,6 +60,7 @@ pub mod geometry;
 pub mod keys;
 pub mod link;
 pub mod messages;
+pub mod offset;
 pub mod pace;
 pub mod realtime;
 pub mod recording;

@@ -17,6 +17,16 @@ pub fn run_before_others() -> bool {
     }
 }
 
+/// Asks the system to run the calling thread only when others leave a processor free for it, nearly: work that may
+/// be late, so that other work is not.
+pub fn run_after_others() {
+    /// Niceness: 0 is ordinary, 19 the last.
+    const NICENESS: libc::c_int = 15;
+    // SAFETY: plain integers. On Linux niceness is a thread's own, and 0 is the calling thread.
+    // A refusal leaves it ordinary, which is no harm.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) };
+}
+
 /// Keeps all of the process's memory, now and later, in the machine's: a thread with a deadline never waits
 /// for a page. Tells whether the system agreed: it does for root, or without a limit on locked memory
 /// (`ulimit -l unlimited`).
@@ -38,6 +48,7 @@ mod tests {
     fn asking_never_fails_hard() {
         // Granted or not is the system's affair; the thread goes on either way.
         let _granted = super::run_before_others();
+        std::thread::spawn(super::run_after_others).join().unwrap();
         let _granted = super::lock_memory();
     }
 }

@@ -4,7 +4,10 @@
 //! for seconds and then close the transport. Every stream but the event log is express, that is sent at
 //! once and not batched: batching costs small messages their latency.
 
-use crate::messages::{Detections, Event, Header, OperatorCommand, RobotState, SimTruth, Stop, Tracking};
+use crate::messages::{
+    ClockPing, ClockPong, Detections, Event, Header, Motions, OperatorCommand, RobotState, SimTruth, Stop,
+    Tracking,
+};
 pub use zenoh::qos::{CongestionControl, Priority};
 
 /// How one message type travels.
@@ -67,12 +70,17 @@ macro_rules! wire {
 /// Enough for a command with a trajectory of 32 poses of three bodies (8 kB), with room for fields to come.
 pub(crate) const COMMAND_MAX_BYTES: usize = 16 * 1024;
 const STATE_MAX_BYTES: usize = 64 * 1024;
+const CLOCK_MAX_BYTES: usize = 256;
 
 wire! {
     OperatorCommand: Topic::stream("command", Priority::RealTime, COMMAND_MAX_BYTES);
     Stop: Topic::stream("stop", Priority::RealTime, COMMAND_MAX_BYTES);
     RobotState: Topic::stream("state", Priority::InteractiveHigh, STATE_MAX_BYTES);
     Detections: Topic { named: true, ..Topic::stream("detections", Priority::InteractiveHigh, STATE_MAX_BYTES) };
+    Motions: Topic::stream("motions", Priority::InteractiveHigh, STATE_MAX_BYTES);
+    // Nothing waits before them: what they measure is the way.
+    ClockPing: Topic::stream("clock_ping", Priority::RealTime, CLOCK_MAX_BYTES);
+    ClockPong: Topic::stream("clock_pong", Priority::RealTime, CLOCK_MAX_BYTES);
     SimTruth: Topic::stream("truth", Priority::InteractiveLow, STATE_MAX_BYTES);
     Tracking: Topic::stream("tracking", Priority::DataHigh, STATE_MAX_BYTES);
     Event: Topic { express: false, ..Topic::stream("event", Priority::DataLow, STATE_MAX_BYTES) };

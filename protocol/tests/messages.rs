@@ -2,8 +2,8 @@
 
 use locoman_protocol::messages::foxglove::{CameraCalibration, CompressedImage, FrameTransforms};
 use locoman_protocol::messages::{
-    Detections, Event, Header, OperatorCommand, Pose, Quaternion, RobotState, ShellPose, SimTruth, Stop,
-    Timing, Tracking, Trajectory, Vector3, Waypoint,
+    ClockPing, ClockPong, Detections, Event, Header, Motions, OperatorCommand, Pose, Quaternion, RobotState,
+    ShellPose, SimTruth, Stop, Timing, Tracking, Trajectory, Vector3, Waypoint,
 };
 use locoman_protocol::{Topic, Wire, validate};
 use proptest::prelude::*;
@@ -27,6 +27,9 @@ fn all_total(bytes: &[u8]) -> Result<(), TestCaseError> {
     total::<SimTruth>(bytes)?;
     total::<Tracking>(bytes)?;
     total::<Detections>(bytes)?;
+    total::<Motions>(bytes)?;
+    total::<ClockPing>(bytes)?;
+    total::<ClockPong>(bytes)?;
     total::<Event>(bytes)?;
     total::<CompressedImage>(bytes)?;
     total::<CameraCalibration>(bytes)?;
@@ -157,13 +160,16 @@ proptest! {
 
 #[test]
 fn no_two_messages_share_a_key() {
-    let topics: [Topic; 7] = [
+    let topics: [Topic; 10] = [
         OperatorCommand::TOPIC,
         Stop::TOPIC,
         RobotState::TOPIC,
         SimTruth::TOPIC,
         Tracking::TOPIC,
         Detections::TOPIC,
+        Motions::TOPIC,
+        ClockPing::TOPIC,
+        ClockPong::TOPIC,
         Event::TOPIC,
     ];
     let suffixes: HashSet<_> = topics.iter().map(|topic| topic.suffix).collect();

@@ -2,6 +2,9 @@
 // and picture belong to the same instant.
 const ACCEPTED = '#7fff7f';
 const REFUSED = '#ff5c57';
+const SEARCHED = '#5cb8ff';
+const MISSED = '#8592a6';
+const REPROJECTED = '#ffb454';
 const AXES = ['#ff5c57', '#7fd17f', '#6f9cff'];
 
 export function makeCameras(parent) {
@@ -23,14 +26,19 @@ export function makeCameras(parent) {
     if (it.busy) return;
     it.busy = true;
     try {
-      const bitmap = await createImageBitmap(jpeg);
-      canvas.width = bitmap.width;
-      canvas.height = bitmap.height;
+      // Another machine's images stay there: only what was found in them comes.
+      const bitmap = jpeg.size ? await createImageBitmap(jpeg) : null;
+      // From here on without a pause: setting the size clears the picture.
+      [canvas.width, canvas.height] = [head.width / 2, head.height / 2];
       const ctx = canvas.getContext('2d');
-      ctx.drawImage(bitmap, 0, 0);
-      bitmap.close();
+      if (bitmap) {
+        ctx.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+        bitmap.close();
+      }
       overlay(ctx, head, canvas.width / head.width);
-      caption.textContent = `${head.camera} · ${head.tags.length} tags · ${head.dropped} dropped`;
+      const accepted = head.tags.filter((tag) => tag.accepted).length;
+      const where = head.whole ? 'whole image searched' : head.regions.length ? `${head.regions.length} regions searched` : `${head.missed.length} covered`;
+      caption.textContent = `${head.camera}${jpeg.size ? '' : ' (node)'} · ${accepted} of ${head.tags.length} tags · ${head.problem ?? where}`;
     } finally {
       it.busy = false;
     }
@@ -39,13 +47,28 @@ export function makeCameras(parent) {
 
 function overlay(ctx, head, scale) {
   const at = ([x, y]) => [(x + 0.5) * scale, (y + 0.5) * scale];
-  ctx.lineWidth = 1.5;
-  for (const tag of head.tags) {
-    ctx.strokeStyle = tag.accepted ? ACCEPTED : REFUSED;
+  const outline = (corners, color) => {
+    ctx.strokeStyle = color;
     ctx.beginPath();
-    tag.corners.forEach((corner, i) => (i ? ctx.lineTo(...at(corner)) : ctx.moveTo(...at(corner))));
+    corners.forEach((corner, i) => (i ? ctx.lineTo(...at(corner)) : ctx.moveTo(...at(corner))));
     ctx.closePath();
     ctx.stroke();
+  };
+  ctx.lineWidth = 1;
+  ctx.setLineDash([4, 3]);
+  for (const [x, y, w, h] of head.regions) outline([[x, y], [x + w, y], [x + w, y + h], [x, y + h]], SEARCHED);
+  // Expected and not read: a covered tag, mostly.
+  for (const tag of head.missed) outline(tag.corners, MISSED);
+  ctx.setLineDash([]);
+  ctx.font = '11px system-ui, "DejaVu Sans", sans-serif';
+  for (const tag of head.tags) {
+    if (tag.reprojected) { ctx.lineWidth = 1; outline(tag.reprojected, REPROJECTED); }
+    ctx.lineWidth = 1.5;
+    outline(tag.corners, tag.accepted ? ACCEPTED : REFUSED);
+    if (tag.accepted) continue;
+    // Why not: too far from where the shell's pose has it, or no pose at all.
+    const why = tag.off_px === null ? 'no pose' : `${tag.off_px.toFixed(1)} px off`;
+    label(ctx, `${tag.id}: ${why}`, at(tag.corners[2]), REFUSED);
   }
   ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
   for (const shell of head.axes) {
@@ -59,11 +82,14 @@ function overlay(ctx, head, scale) {
       ctx.lineTo(...at(end));
       ctx.stroke();
     });
-    const label = shell.name.replace('_', ' ');
-    ctx.lineWidth = 3;
-    ctx.strokeStyle = '#000c';
-    ctx.strokeText(label, origin[0] + 6, origin[1] - 6);
-    ctx.fillStyle = '#fff';
-    ctx.fillText(label, origin[0] + 6, origin[1] - 6);
+    label(ctx, shell.name.replace('_', ' '), origin, '#fff');
   }
+}
+
+function label(ctx, text, [x, y], color) {
+  ctx.lineWidth = 3;
+  ctx.strokeStyle = '#000c';
+  ctx.strokeText(text, x + 6, y - 6);
+  ctx.fillStyle = color;
+  ctx.fillText(text, x + 6, y - 6);
 }

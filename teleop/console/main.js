@@ -40,6 +40,14 @@ $('stop').onclick = stop;
 document.querySelectorAll('[data-mode]').forEach((b) => { b.onclick = () => { requestMode(b.dataset.mode); b.blur(); }; });
 document.querySelectorAll('[data-drive]').forEach((b) => { b.onclick = () => { input.set('drive', b.dataset.drive); b.blur(); }; });
 document.querySelectorAll('[data-target]').forEach((b) => { b.onclick = () => { input.set('target', b.dataset.target); b.blur(); }; });
+document.querySelectorAll('[data-look]').forEach((b) => {
+  b.hidden = !scene.hasOperator;
+  b.onclick = () => {
+    scene.look(b.dataset.look);
+    document.querySelectorAll('[data-look]').forEach((other) => other.classList.toggle('on', other === b));
+    b.blur();
+  };
+});
 let auto = null;
 $('auto').onclick = () => { link.send({ auto: !auto }); $('auto').blur(); };
 
@@ -69,6 +77,8 @@ const bar = (share) => mark('bar', `width: ${Math.min(100, 100 * share)}%`);
 const swatch = (color) => mark('swatch', `background: ${color}`);
 const ms = (value) => (value === null || value === undefined ? '–' : `${value.toFixed(value < 10 ? 2 : 1)}`);
 
+const signed = (value) => `${value < 0 ? '−' : '+'}${Math.abs(value) < 1000 ? Math.abs(value).toFixed(2) : Math.abs(value).toExponential(2)}`;
+
 let [tables, first] = [0, true];
 function show(status) {
   const { robot, pilot, tracking } = status;
@@ -78,7 +88,7 @@ function show(status) {
     if (pilot.auto === null) input.set('drive', 'tracker');
   }
   scene.robot(robot);
-  scene.operator(tracking.shells);
+  scene.operator(tracking.shells, status.cameras);
   if (tracking.fresh) addCurves(tracking.shells);
   if (status.robot_silent_s !== null && status.robot_silent_s <= 0.5) banner('');
   else if (status.robot_silent_s === null) banner('No robot yet: nothing has been heard since the station started');
@@ -109,6 +119,18 @@ function show(status) {
     return [words(s.name), swatch(shellColor(s.name)), [s.verdict, good ? 'good' : s.verdict === 'predicted' ? 'warn' : 'bad'],
       good ? `${s.rms_px.toFixed(2)} px` : '', good ? `${s.sigma_mm.toFixed(2)} mm` : '', `${s.tags} tags`];
   }));
+  $('camera-card').hidden = !status.cameras.length;
+  const clocks = status.cameras.some((camera) => camera.clock);
+  const heads = ['', 'age', 'dropped', 'read', 'tags', ...(clocks ? ['clock'] : [])];
+  rows($('camera-table'), [heads.map((head) => [head, 'head']), ...status.cameras.map((c) => {
+    const dropped = c.frames ? (100 * c.dropped) / c.frames : 0;
+    const cells = [words(c.name), c.age_ms === null ? ['never', 'bad'] : c.silent ? [`silent ${(c.age_ms / 1000).toFixed(1)} s`, 'bad'] : [`${c.age_ms.toFixed(0)} ms`, 'good'],
+      [`${dropped.toFixed(1)} %`, dropped > 5 ? 'warn' : ''], `${ms(c.read_ms)} ms`,
+      [`${c.seen.accepted.length} / ${c.seen.accepted.length + c.seen.refused.length}`, c.seen.refused.length > c.seen.accepted.length ? 'warn' : '']];
+    if (clocks) cells.push(c.clock ? `${signed(c.clock.offset_ms)} ± ${c.clock.error_ms.toFixed(2)} ms` : 'here');
+    return cells;
+  })]);
+  items($('camera-problems'), status.cameras.filter((c) => c.problem).map((c) => `${words(c.name)}: ${c.problem}`));
   if (robot) {
     $('owner').textContent = robot.ours ? 'obeys this station' : robot.command_age_ms === null ? 'has no commands' : 'obeys somebody else';
     rows($('robot'), [

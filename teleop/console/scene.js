@@ -1,5 +1,6 @@
-// The 3D view: robot, its target beside it, the operator's shells at the side.
+// The 3D view: the robot with its targets, and beside it the operator as the tracker has it.
 import { AmbientLight, AxesHelper, BoxGeometry, Color, DirectionalLight, EdgesGeometry, Fog, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineSegments, Mesh, MeshStandardMaterial, OrbitControls, PerspectiveCamera, Scene, SphereGeometry, WebGLRenderer } from './vendor/three.min.js';
+import { makeOperator } from './operator.js';
 import { robotFromUrdf } from './urdf.js';
 
 // Standing, arms stowed along the calves: what is shown before any robot has spoken.
@@ -42,35 +43,12 @@ function targetFrame() {
   return group;
 }
 
-/** Shells where the operator stands; drawn at the robot's left, turned to face the same way. */
-function operatorShells(scene) {
-  const place = new Group();
-  place.position.set(0.05, 0.75, 0.1);
-  place.scale.setScalar(0.5); // a person is four times as tall as the robot
-  scene.add(place);
-  const shells = new Map();
-  let home = null;
-  const sizes = { torso: [0.04, 0.3, 0.3], palm: [0.07, 0.07, 0.03], thumb: [0.03, 0.03, 0.02] };
-  return (reports) => {
-    for (const report of reports) {
-      let group = shells.get(report.name);
-      if (!group) {
-        group = new Group();
-        const size = sizes[report.name.split('_').pop()] ?? sizes.thumb;
-        const body = new Mesh(new BoxGeometry(...size), new MeshStandardMaterial({ color: 0x7fd17f, transparent: true, opacity: 0.55 }));
-        group.add(body, new AxesHelper(report.name === 'torso' ? 0.25 : 0.12));
-        group.userData.body = body;
-        shells.set(report.name, group);
-        place.add(group);
-      }
-      const usable = report.verdict !== 'lost' && report.pose;
-      if (usable && report.name === 'torso' && !home) home = report.pose.p;
-      setPose(group, usable ? report.pose : null);
-      if (usable && home) { group.position.x -= home[0]; group.position.y -= home[1]; group.position.z += 0.75 - home[2]; }
-      group.userData.body.material.color.set(report.verdict === 'tracked' ? 0x7fd17f : 0xffb454);
-    }
-  };
-}
+/** Where the operator's room is drawn: at the robot's left, turned to face the same way. */
+const ROOM = { at: [0, 0.7, -0.1], scale: 0.5 }; // a person is four times as tall as the robot
+const VIEWS = {
+  both: { from: [1.45, -0.95, 0.8], to: [0.1, 0.16, 0.22] },
+  operator: { from: [0.62, 0.12, 0.86], to: [0.2, 0.7, 0.5] },
+};
 
 export async function makeScene(canvas) {
   const renderer = new WebGLRenderer({ canvas, antialias: true });
@@ -89,10 +67,13 @@ export async function makeScene(canvas) {
   scene.add(ground);
   const camera = new PerspectiveCamera(42, 1, 0.02, 30);
   camera.up.set(0, 0, 1);
-  camera.position.set(1.45, -0.95, 0.8);
   const controls = new OrbitControls(camera, canvas);
-  controls.target.set(0.1, 0.16, 0.22);
-  controls.update();
+  const look = (view) => {
+    camera.position.set(...VIEWS[view].from);
+    controls.target.set(...VIEWS[view].to);
+    controls.update();
+  };
+  look('both');
 
   // Estimates count from the torso frame at the last reset, which is not the ground: the feet are.
   const world = new Group();
@@ -105,7 +86,11 @@ export async function makeScene(canvas) {
   const footTargets = [targetPoint(FOOT_RADIUS_M + 0.004), targetPoint(FOOT_RADIUS_M + 0.004)];
   world.add(torsoTarget, ...gripperTargets, ...footTargets);
   [torsoTarget, ...gripperTargets, ...footTargets].forEach((object) => { object.visible = false; });
-  const showShells = operatorShells(scene);
+  const room = new Group();
+  room.position.set(...ROOM.at);
+  room.scale.setScalar(ROOM.scale);
+  scene.add(room);
+  const operator = await makeOperator(room).catch((error) => { console.warn('no picture of the operator:', error); return null; });
 
   let robot = null;
   try {
@@ -152,6 +137,9 @@ export async function makeScene(canvas) {
       ['right_foot', 'left_foot'].forEach((mode, i) => setPose(footTargets[i], state.mode === mode ? state.foot_targets[i] : null));
       dirty = true;
     },
-    operator(shells) { showShells(shells); dirty = true; },
+    operator(shells, cameras) { operator?.show(shells, cameras); dirty = true; },
+    /** `both` or `operator`. */
+    look(view) { look(view); dirty = true; },
+    hasOperator: Boolean(operator),
   };
 }

@@ -1,33 +1,24 @@
 //! What the threads of the station tell each other: the newest of everything, each behind its own lock that
 //! is held for a copy only.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use locoman_protocol::Received;
 use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Mode, OperatorCommand, RobotState, SimTruth, Tracking};
-use locoman_vision::source::FrameSet;
-use locoman_vision::track::TrackUpdate;
 
 use crate::latency::Latency;
 use crate::latest::lock;
-use crate::observe::Observation;
+use crate::observe::Tracked;
 use crate::pilot::Note;
+use crate::shown::Shown;
+use crate::sight::Counters;
 use crate::stick::Hand;
 
 /// Events kept for the console.
 const EVENTS: usize = 30;
-
-/// Images of one instant, and what was found in them.
-#[derive(Debug, Clone)]
-pub struct Preview {
-    /// As the cameras delivered them.
-    pub frames: Arc<FrameSet>,
-    /// What the tracker made of them.
-    pub update: Arc<TrackUpdate>,
-}
 
 /// What the pilot does, for the console.
 #[derive(Debug, Clone, Default)]
@@ -57,13 +48,15 @@ pub struct Board {
     /// The simulator's last truth, if there is a simulator.
     pub truth: Mutex<Option<Arc<Received<SimTruth>>>>,
     /// What may move the robot.
-    pub seen: Mutex<Option<Observation>>,
+    pub seen: Mutex<Option<Tracked>>,
     /// The tracker's last report.
     pub tracking: Mutex<Option<Arc<Tracking>>>,
     /// When the last tracking reports were made, for the rate.
     pub tracked_ns: Mutex<VecDeque<u64>>,
-    /// Images for the console; only kept while a browser looks.
-    pub preview: Mutex<Option<Preview>>,
+    /// What each camera saw last, for the console; only kept while a browser looks.
+    pub shown: Mutex<BTreeMap<usize, Arc<Shown>>>,
+    /// Counts of each camera, once there are cameras.
+    pub counters: OnceLock<Arc<Counters>>,
     /// Browsers connected.
     pub viewers: AtomicUsize,
     /// The gamepad at this computer.
@@ -85,7 +78,7 @@ pub struct Board {
     /// The recorded operator waits: the autopilot has not engaged yet.
     pub hold_replay: Arc<AtomicBool>,
     /// Everything ends.
-    pub stop: AtomicBool,
+    pub stop: Arc<AtomicBool>,
 }
 
 impl Board {

@@ -7,6 +7,7 @@ use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::messages::{Event, OperatorCommand, RobotState};
 use locoman_protocol::pace::Pace;
 use locoman_protocol::{Received, Sender, realtime};
+use locoman_vision::track::TrackerSettings;
 
 use crate::board::{Board, PilotStatus};
 use crate::config::Config;
@@ -33,6 +34,8 @@ pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Sender
     realtime::run_before_others();
     let period_ns = (1e9 / config.command.rate_hz) as u64;
     let silent_ns = config.command.browser_silent_ms * 1_000_000;
+    let ahead_max_ns = config.tracking.ahead_max_ms * 1_000_000;
+    let filter = TrackerSettings::default().filter;
     let mut pace = Pace::new(period_ns);
     let mut sent_capture_ns = 0;
     while !board.stopping() {
@@ -40,7 +43,7 @@ pub fn run(mut pilot: Pilot, config: &Config, board: &Board, mut senders: Sender
         let robot: Option<Arc<Received<RobotState>>> = lock(&board.robot).clone();
         let inputs = Inputs {
             robot: robot.map(|robot| RobotView::new(&robot.message, robot.received_ns)),
-            seen: *lock(&board.seen),
+            seen: lock(&board.seen).as_ref().map(|seen| seen.at(now_ns, ahead_max_ns, &filter)),
             joystick: *lock(&board.joystick),
             browser: board.browser(now_ns, silent_ns),
             mode: lock(&board.mode).take(),

@@ -115,6 +115,10 @@ impl Default for Opening {
 pub struct Tracking {
     /// Longest time for which a prediction stands in for a measurement.
     pub predicted_max_ms: u64,
+    /// Farthest that a pose is predicted beyond its capture, to the time of sending.
+    pub ahead_max_ms: u64,
+    /// How long the first reading of an instant waits for cameras that are exposed together with it.
+    pub straggler_ms: u64,
     /// Oldest result that moves anything.
     pub stale_ms: u64,
     /// A larger step between two sightings, beyond what the speeds below allow, starts a new engagement.
@@ -133,6 +137,8 @@ impl Default for Tracking {
     fn default() -> Self {
         Self {
             predicted_max_ms: 100,
+            ahead_max_ms: 80,
+            straggler_ms: 5,
             stale_ms: 400,
             jump_m: 0.06,
             jump_rad: 0.15,
@@ -269,6 +275,8 @@ impl Config {
             ("stick.gripper_limit_rad", k.gripper_limit_rad, TINY..=3.0),
         ];
         let more = [
+            ("tracking.ahead_max_ms", t.ahead_max_ms as f64, 0.0..=200.0),
+            ("tracking.straggler_ms", t.straggler_ms as f64, 0.0..=100.0),
             ("tracking.speed_m_s", t.speed_m_s, 0.0..=5.0),
             ("tracking.speed_rad_s", t.speed_rad_s, 0.0..=5.0),
             ("tracking.jump_gap_ms", t.jump_gap_ms as f64, 0.0..=1000.0),
@@ -301,7 +309,7 @@ mod tests {
         assert_eq!(config, Config::default());
         // Every key is there: without any of its lines the file would still equal the defaults.
         let keys = SHIPPED.lines().filter(|l| l.contains(" = ") && !l.starts_with('#')).count();
-        assert_eq!(keys, 32);
+        assert_eq!(keys, 34);
     }
 
     #[test]

@@ -14,6 +14,7 @@ use locoman_vision::shells::ShellSet;
 
 use crate::config::Config;
 use crate::gamepad;
+use crate::node::{OwnClock, StationClock, described};
 
 /// How long to listen for a robot.
 const LISTEN: Duration = Duration::from_secs(2);
@@ -29,6 +30,8 @@ pub struct Patient<'a> {
     pub console: &'a str,
     pub robot: &'a str,
     pub connect: &'a [String],
+    /// On a camera node: where the station is.
+    pub station: Option<&'a str>,
 }
 
 /// One finding.
@@ -81,6 +84,9 @@ pub fn examine(patient: &Patient<'_>, mut report: impl FnMut(Finding)) {
         }
     });
     report(robot(patient));
+    if let Some(station) = patient.station {
+        report(clock(patient.robot, station));
+    }
 }
 
 fn judge<E: std::fmt::Display>(outcome: Result<String, E>) -> Finding {
@@ -103,6 +109,14 @@ fn recording(path: &Path) -> Finding {
 
 fn cameras(rig: &Rig, report: &mut impl FnMut(Finding)) {
     for (camera, source) in rig.cameras.iter().zip(&rig.sources) {
+        if source.remote {
+            report(Finding::Note(format!(
+                "camera {id}: a camera node reads it; start `locoman-teleop detect --cameras {id} --connect \
+                 tcp/HOST:PORT` there, with this machine's address and the port of `run --listen`",
+                id = camera.id
+            )));
+            continue;
+        }
         let Some(device) = &source.device else { continue };
         report(match std::fs::File::open(device) {
             Ok(_) => Finding::Good(format!("camera {}: {}", camera.id, device.display())),
@@ -121,6 +135,25 @@ fn console(address: &str) -> Finding {
         Err(error) => Finding::Bad(format!(
             "console address {address}: {error}; end the program that uses it (`ss -ltnp`) or give another `--console HOST:PORT`"
         )),
+    }
+}
+
+/// Asks a station for its clock, as a camera node does.
+fn clock(robot: &str, station: &str) -> Finding {
+    let asked = || -> anyhow::Result<_> {
+        let link = Link::open(robot, &Endpoints::connect(&[station]))?;
+        let clock = StationClock::listen(&link, OwnClock::default())?;
+        let deadline = Instant::now() + LISTEN;
+        clock.ask(&mut link.sender()?, || Instant::now() >= deadline);
+        Ok(clock.offset())
+    };
+    match asked() {
+        Ok(Some(offset)) => Finding::Good(format!("station at {station}: its clock: {}", described(&offset))),
+        Ok(None) => Finding::Bad(format!(
+            "no station answers at {station}; start `locoman-teleop run --listen {station}` there, with a rig file \
+             that has `source = {{ remote = true }}`"
+        )),
+        Err(error) => Finding::Bad(error.to_string()),
     }
 }
 

@@ -12,6 +12,8 @@ pub enum Stage {
     Decode,
     Detect,
     Solve,
+    /// The last image of an instant, decoded in memory, to its poses published.
+    InMemory,
     /// Capture to solved.
     Solved,
     /// Solved to sent.
@@ -26,10 +28,11 @@ pub enum Stage {
 
 impl Stage {
     /// All.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Decode,
         Self::Detect,
         Self::Solve,
+        Self::InMemory,
         Self::Solved,
         Self::Map,
         Self::Link,
@@ -43,6 +46,7 @@ impl Stage {
             Self::Decode => "decode",
             Self::Detect => "detect",
             Self::Solve => "solve",
+            Self::InMemory => "image to pose",
             Self::Solved => "capture to pose",
             Self::Map => "pose to command",
             Self::Link => "link",
@@ -55,7 +59,7 @@ impl Stage {
 /// The last durations of every stage.
 #[derive(Debug, Default)]
 pub struct Latency {
-    samples: [VecDeque<u64>; 8],
+    samples: [VecDeque<u64>; 9],
 }
 
 impl Latency {

@@ -10,8 +10,11 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use locoman_protocol::Endpoints;
 use locoman_protocol::messages::Mode;
+use locoman_teleop::replay::Pace;
+use locoman_teleop::review::{self, Tally};
 use locoman_teleop::run::{Operator, Options};
-use locoman_teleop::{doctor, play, poses, record, run, sources};
+use locoman_teleop::sources::Frames;
+use locoman_teleop::{doctor, node, play, poses, record, run, sources};
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
 use locoman_vision::track::{Tracker, TrackerSettings};
@@ -41,6 +44,8 @@ enum Task {
     Track(TrackArgs),
     /// Records the cameras of the rig
     Record(RecordArgs),
+    /// Reads cameras for a station on another machine: a camera node
+    Detect(DetectArgs),
     /// Looks at everything that `run` needs, and says what to do about what is missing
     Doctor(DoctorArgs),
 }
@@ -95,14 +100,43 @@ struct OperatorArgs {
     joystick: bool,
 }
 
+/// How a recording is played.
+#[derive(Debug, Args)]
+struct PaceArgs {
+    /// With --replay: play this many times as fast as it was recorded
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// The recording's first frame is due at this time of the monotonic clock: several programs play together
+    #[arg(long, value_name = "NS", hide = true)]
+    replay_at: Option<u64>,
+}
+
+impl PaceArgs {
+    fn pace(&self) -> Pace {
+        Pace { speed: self.speed, start_ns: self.replay_at }
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(speed) if (0.01..=10.0).contains(&speed) => Ok(speed),
+        _ => Err("write a number from 0.01 to 10".to_owned()),
+    }
+}
+
 #[derive(Debug, Args)]
 struct RunArgs {
     #[command(flatten)]
     operator: OperatorArgs,
     #[command(flatten)]
+    pace: PaceArgs,
+    #[command(flatten)]
     files: Files,
     #[command(flatten)]
     peer: Peer,
+    /// Where camera nodes find this station [default: tcp/0.0.0.0:7449 if the rig file has remote cameras]
+    #[arg(long, value_name = "tcp/HOST:PORT")]
+    listen: Vec<String>,
     /// With --replay: bring the robot into this mode and engage without a person; the recorded operator
     /// waits at the recording's begin until then
     #[arg(long, value_name = "MODE", conflicts_with_all = ["cameras", "joystick"])]
@@ -162,6 +196,9 @@ struct TrackArgs {
     /// The table of poses
     #[arg(short, long, value_name = "POSES.csv")]
     output: PathBuf,
+    /// Also write residuals, coverage, losses, jumps and times into this folder, as text, JSON and plots
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -177,6 +214,32 @@ struct RecordArgs {
 }
 
 #[derive(Debug, Args)]
+struct DetectArgs {
+    #[command(flatten)]
+    files: Files,
+    /// Ids of the cameras to read [default: those that the rig file calls remote]
+    #[arg(long, value_name = "ID,ID", value_delimiter = ',')]
+    cameras: Vec<String>,
+    /// Read them from a recording, over and over, in place of the devices
+    #[arg(long, value_name = "REC")]
+    replay: Option<PathBuf>,
+    #[command(flatten)]
+    pace: PaceArgs,
+    /// Name of the robot
+    #[arg(long, default_value = "locoman", value_name = "NAME")]
+    robot: String,
+    /// Where the station listens
+    #[arg(long, value_name = "tcp/HOST:PORT", default_values = ["tcp/127.0.0.1:7449"])]
+    connect: Vec<String>,
+    /// End after this time
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// Pretend that this machine's clock is ahead by so much: for tests
+    #[arg(long, value_name = "MS", default_value_t = 0.0, hide = true, allow_negative_numbers = true)]
+    clock_shift_ms: f64,
+}
+
+#[derive(Debug, Args)]
 struct DoctorArgs {
     #[command(flatten)]
     files: Files,
@@ -185,6 +248,9 @@ struct DoctorArgs {
     /// A recording to look at
     #[arg(long, value_name = "REC")]
     replay: Option<PathBuf>,
+    /// On a camera node: the station whose clock to ask for
+    #[arg(long, value_name = "tcp/HOST:PORT")]
+    station: Option<String>,
 }
 
 fn main() -> ExitCode {
@@ -231,8 +297,12 @@ fn obey(cli: Cli) -> Result<()> {
             let rig = Rig::load(&args.files.rig(&configs))?;
             let shells = ShellSet::load(&args.files.shells(&configs))?;
             sources::check(&args.recording)?;
-            let tracker = Tracker::new(rig, shells, TrackerSettings::default())?;
-            let summary = poses::write(&args.recording, tracker, &args.output)?;
+            let tracker = Tracker::new(rig.clone(), shells.clone(), TrackerSettings::default())?;
+            let mut tally = Tally::new(rig.cameras.len(), shells.shells.len());
+            let summary = poses::write(&args.recording, tracker, &args.output, &mut tally)?;
+            if let Some(folder) = &args.report {
+                println!("{}", review::write(folder, &tally, &rig, &shells)?);
+            }
             tracing::info!(
                 "{} poses of {} instants in {} ({} frames skipped)",
                 summary.poses,
@@ -252,6 +322,7 @@ fn obey(cli: Cli) -> Result<()> {
             tracing::info!("{frames} frames in {}", args.output.display());
             Ok(())
         }
+        Task::Detect(args) => detect(&configs, args),
         Task::Doctor(args) => examine(&configs, &args),
     }
 }
@@ -280,8 +351,8 @@ fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {
     let OperatorArgs { replay, cameras, .. } = args.operator;
     let rig = cameras.clone().unwrap_or_else(|| args.files.rig(&configs));
     let operator = match (replay, cameras) {
-        (Some(path), _) => Operator::Replay(path),
-        (None, Some(_)) => Operator::Cameras,
+        (Some(path), _) => Operator::Tracked(Frames::Replay(path, args.pace.pace())),
+        (None, Some(_)) => Operator::Tracked(Frames::Live),
         (None, None) => Operator::Joystick,
     };
     let (interrupt, interrupted) = mpsc::channel();
@@ -295,13 +366,31 @@ fn drive(configs: PathBuf, args: RunArgs) -> Result<()> {
         configs,
         operator,
         robot: args.peer.robot,
-        endpoints: Endpoints { listen: Vec::new(), connect: args.peer.connect },
+        listen: args.listen,
+        connect: args.peer.connect,
         console: args.peer.console,
         auto_engage: args.auto_engage.map(Into::into),
         record: args.record,
         seconds: args.seconds,
     };
     run::run(&options, &interrupted)
+}
+
+fn detect(configs: &Path, args: DetectArgs) -> Result<()> {
+    let own_clock = node::OwnClock { shift_ns: (args.clock_shift_ms * 1e6) as i64 };
+    let pace = args.pace.pace();
+    let pace = Pace { start_ns: pace.start_ns.map(|start_ns| own_clock.moved(start_ns)), ..pace };
+    let options = node::Options {
+        rig: args.files.rig(configs),
+        shells: args.files.shells(configs),
+        cameras: args.cameras,
+        frames: args.replay.map_or(Frames::Live, |path| Frames::Replay(path, pace)),
+        robot: args.robot,
+        endpoints: Endpoints { listen: Vec::new(), connect: args.connect },
+        own_clock,
+        seconds: args.seconds,
+    };
+    node::run(&options, &stop_on_signal()?)
 }
 
 fn examine(configs: &Path, args: &DoctorArgs) -> Result<()> {
@@ -313,6 +402,7 @@ fn examine(configs: &Path, args: &DoctorArgs) -> Result<()> {
         console: &args.peer.console,
         robot: &args.peer.robot,
         connect: &args.peer.connect,
+        station: args.station.as_deref(),
     };
     let mut failures = 0;
     doctor::examine(&patient, |finding| {

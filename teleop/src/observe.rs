@@ -1,8 +1,11 @@
 //! From the tracker's report to what may move the robot: a shell counts while it is tracked, and for a
-//! short time while it is predicted.
+//! short time while it is predicted. Its pose is taken to the time at which it is used: what capture, detection and
+//! sending take is not seen as delay, as long as the motion goes on.
 
 use locoman_protocol::geometry;
 use locoman_protocol::messages::{self, Verdict};
+use locoman_vision::shells::ShellSet;
+use locoman_vision::track::{FilterSettings, Motion, Motions};
 use nalgebra::Isometry3;
 
 /// The five shells that an operator wears.
@@ -59,6 +62,42 @@ impl Observation {
     }
 }
 
+/// The last word of the tracker, with what is needed to take it to a later time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracked {
+    /// At the time of capture.
+    pub observation: Observation,
+    /// How each shell moved when it was measured last; in the order of [`Shell::ALL`].
+    motions: [Option<Motion>; 5],
+}
+
+impl Tracked {
+    /// `motions` is in the order of `shells`.
+    pub fn new(observation: Observation, motions: &Motions, shells: &ShellSet) -> Self {
+        let motion = |shell: Shell| {
+            let index = shells.shells.iter().position(|known| known.name == shell.name())?;
+            motions.latest().get(index)?.clone()
+        };
+        Self { observation, motions: Shell::ALL.map(motion) }
+    }
+
+    /// Where the usable shells are at a time, at most `ahead_max_ns` after the capture: beyond that a prediction would
+    /// be more noise than knowledge, and the poses stay.
+    ///
+    /// The capture time stays too: it tells how old the knowledge is.
+    pub fn at(&self, now_ns: u64, ahead_max_ns: u64, filter: &FilterSettings) -> Observation {
+        let capture_ns = self.observation.capture_ns;
+        let time_ns = now_ns.clamp(capture_ns, capture_ns.saturating_add(ahead_max_ns));
+        let mut observation = self.observation;
+        for (pose, motion) in observation.world_from_shell.iter_mut().zip(&self.motions) {
+            if let (Some(pose), Some(motion)) = (pose, motion) {
+                *pose = motion.predicted(time_ns, filter).world_from_shell;
+            }
+        }
+        observation
+    }
+}
+
 /// Remembers when each shell was last measured.
 #[derive(Debug)]
 pub struct Observer {
@@ -99,6 +138,8 @@ impl Observer {
 mod tests {
     use super::*;
     use locoman_protocol::messages::{Header, ShellPose, Tracking};
+    use locoman_vision::pose::{Matrix18, State};
+    use nalgebra::Vector3;
 
     fn report(capture_ms: u64, verdict: Verdict) -> Tracking {
         Tracking {
@@ -123,6 +164,36 @@ mod tests {
         assert!(!seen(sut.observe(&report(1111, Verdict::Predicted))));
         assert!(!seen(sut.observe(&report(1112, Verdict::Lost))));
         assert!(seen(sut.observe(&report(1113, Verdict::Tracked))));
+    }
+
+    #[test]
+    fn a_moving_shell_is_taken_to_the_time_of_use_but_not_far() {
+        let (filter, names) = (FilterSettings::default(), ["torso", "right_palm"]);
+        let capture_ns = 660_000_000;
+        let state = State {
+            world_from_shell: Isometry3::translation(0.2, 0.0, 1.0),
+            velocity_m_s: Vector3::new(0.3, 0.0, 0.0),
+            ..State::still(Isometry3::identity())
+        };
+        let motion = Motion::begin(capture_ns, &state, &(Matrix18::identity() * 1e-8));
+        let shells = ShellSet {
+            family: "tag36h11".into(),
+            shells: names
+                .map(|name| locoman_vision::shells::Shell { name: name.into(), tags: vec![] })
+                .into(),
+        };
+        let mut observation = Observation { capture_ns, ..Observation::default() };
+        observation.world_from_shell[Shell::RightPalm as usize] = Some(motion.world_from_shell);
+        let sut = Tracked::new(observation, &Motions::new(vec![None, Some(motion)], 250_000_000), &shells);
+        let x = |now_ns| {
+            let seen = sut.at(now_ns, 60_000_000, &filter);
+            assert_eq!((seen.capture_ns, seen.shell(Shell::Torso)), (capture_ns, None));
+            seen.shell(Shell::RightPalm).unwrap().translation.x
+        };
+        let start = x(capture_ns);
+        assert!((x(capture_ns + 40_000_000) - start - 0.012).abs() < 1e-4);
+        assert_eq!(x(capture_ns + 60_000_000), x(capture_ns + 400_000_000));
+        assert_eq!(x(capture_ns - 1), start);
     }
 
     #[test]

@@ -6,11 +6,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use locoman_vision::source::FrameSets;
+use locoman_vision::source::{FrameSets, open_recording};
 use locoman_vision::track::{ShellUpdate, Tracker, Verdict};
 
-use crate::feed::{Boxed, SET_TOLERANCE_NS};
-use crate::sources;
+use crate::review::Tally;
 
 /// The header of the file.
 const COLUMNS: [&str; 14] = [
@@ -41,20 +40,21 @@ pub struct Summary {
     pub skipped: u64,
 }
 
-/// Tracks `recording` and writes `output`, which appears only when it is complete.
-pub fn write(recording: &Path, mut tracker: Tracker, output: &Path) -> Result<Summary> {
-    let source = sources::recording(recording, tracker.rig())?;
-    let cameras = tracker.rig().cameras.len();
+/// Tracks `recording` and writes `output`, which appears only when it is complete; `tally` hears of every instant.
+pub fn write(recording: &Path, mut tracker: Tracker, output: &Path, tally: &mut Tally) -> Result<Summary> {
+    let source = open_recording(recording, tracker.rig())?;
+    let sync_groups = tracker.rig().sync_groups.clone();
     let partial = partial_path(output);
     let mut summary = Summary { instants: 0, poses: 0, skipped: 0 };
     let written = (|| -> Result<()> {
         let mut csv = csv::Writer::from_path(&partial)
             .with_context(|| format!("cannot write {}; is the folder there?", partial.display()))?;
         csv.write_record(COLUMNS)?;
-        let mut sets = FrameSets::new(Boxed(source), cameras, SET_TOLERANCE_NS);
+        let mut sets = FrameSets::new(source, &sync_groups);
         while let Some(set) = sets.next_set()? {
             let update = tracker.update(&set);
             summary.instants += 1;
+            tally.add(&update);
             for (shell, seen) in tracker.shells().shells.iter().zip(&update.shells) {
                 if let Some(row) = row(update.time_ns, &shell.name, seen) {
                     csv.write_record(row)?;

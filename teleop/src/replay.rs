@@ -14,7 +14,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use locoman_vision::image::Frame;
 use locoman_vision::source::{FrameSource, SourceError};
 
-use crate::feed::SET_TOLERANCE_NS;
+/// Frames of the first instant lie closer together than this: half the period of 60 Hz cameras.
+const INSTANT_NS: u64 = 8_000_000;
+
+/// How fast a recording is played, and from when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// 1: as it was recorded; 0.5: in slow motion.
+    pub speed: f64,
+    /// When its first frame is due, on the monotonic clock; `None`: soon. So several machines play one recording
+    /// together.
+    pub start_ns: Option<u64>,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { speed: 1.0, start_ns: None }
+    }
+}
 
 /// Opens the recording anew for each turn.
 pub type Reopen = Box<dyn FnMut() -> Result<Box<dyn FrameSource>, SourceError> + Send>;
@@ -36,21 +53,27 @@ pub struct Replay {
     /// The latest capture time delivered, on this machine's clock.
     emitted_ns: Option<u64>,
     period_ns: u64,
+    speed: f64,
     /// Whether the source stands at its begin.
     rewound: bool,
     skipped: u64,
 }
 
 impl Replay {
-    /// Opens the recording; its first frame will be captured at `start_ns`. While `hold` is set it stands at
-    /// its first instant.
-    pub fn open(mut reopen: Reopen, start_ns: u64, hold: Arc<AtomicBool>) -> Result<Self, SourceError> {
+    /// Opens the recording; its first frame will be captured at `start_ns`, and it plays `speed` times as fast as it
+    /// was recorded. While `hold` is set it stands at its first instant.
+    pub fn open(
+        mut reopen: Reopen,
+        start_ns: u64,
+        speed: f64,
+        hold: Arc<AtomicBool>,
+    ) -> Result<Self, SourceError> {
         let mut source = reopen()?;
         let mut opening: Vec<Frame> = Vec::new();
         let mut period_ns = DEFAULT_PERIOD_NS;
         while let Some(frame) = source.next_frame()? {
             let first_ns = opening.first().map_or(frame.capture_ns, |first| first.capture_ns);
-            if frame.capture_ns > first_ns + SET_TOLERANCE_NS {
+            if frame.capture_ns > first_ns + INSTANT_NS {
                 period_ns = (frame.capture_ns - first_ns).min(1_000_000_000);
                 break;
             }
@@ -65,7 +88,8 @@ impl Replay {
             waiting: VecDeque::new(),
             base_ns: start_ns,
             emitted_ns: None,
-            period_ns,
+            period_ns: (period_ns as f64 / speed) as u64,
+            speed,
             rewound: true,
             skipped: 0,
         })
@@ -87,7 +111,8 @@ impl Replay {
 
     fn emit(&mut self, mut frame: Frame) -> Frame {
         let first_ns = self.opening.first().map_or(0, |first| first.capture_ns);
-        frame.capture_ns = self.base_ns + frame.capture_ns.saturating_sub(first_ns);
+        let since_first_ns = frame.capture_ns.saturating_sub(first_ns);
+        frame.capture_ns = self.base_ns + (since_first_ns as f64 / self.speed).round() as u64;
         self.emitted_ns = self.emitted_ns.max(Some(frame.capture_ns));
         frame
     }
@@ -146,9 +171,9 @@ mod tests {
         }
     }
 
-    fn replay(frames: &'static [(usize, u64)], hold: &Arc<AtomicBool>) -> Replay {
+    fn replay(frames: &'static [(usize, u64)], speed: f64, hold: &Arc<AtomicBool>) -> Replay {
         let reopen: Reopen = Box::new(|| Ok(Box::new(Script(frames.iter()))));
-        Replay::open(reopen, 1000 * MS, Arc::clone(hold)).unwrap()
+        Replay::open(reopen, 1000 * MS, speed, Arc::clone(hold)).unwrap()
     }
 
     fn next(sut: &mut Replay) -> (usize, u64) {
@@ -160,15 +185,22 @@ mod tests {
 
     #[test]
     fn a_recording_loops_without_a_gap_in_time() {
-        let mut sut = replay(TWO_INSTANTS, &Arc::default());
+        let mut sut = replay(TWO_INSTANTS, 1.0, &Arc::default());
         let times: Vec<u64> = (0..9).map(|_| next(&mut sut).1).collect();
         assert_eq!(times, [1000, 1001, 1030, 1031, 1061, 1062, 1091, 1092, 1122]);
     }
 
     #[test]
+    fn slow_motion_stretches_the_times() {
+        let mut sut = replay(TWO_INSTANTS, 0.5, &Arc::default());
+        let times: Vec<u64> = (0..5).map(|_| next(&mut sut).1).collect();
+        assert_eq!(times, [1000, 1002, 1060, 1062, 1122]);
+    }
+
+    #[test]
     fn held_it_stands_at_its_first_instant_and_then_plays_from_there() {
         let hold = Arc::new(AtomicBool::new(true));
-        let mut sut = replay(TWO_INSTANTS, &hold);
+        let mut sut = replay(TWO_INSTANTS, 1.0, &hold);
         let held: Vec<_> = (0..5).map(|_| next(&mut sut)).collect();
         assert_eq!(held, [(0, 1000), (1, 1001), (0, 1031), (1, 1032), (0, 1062)]);
         hold.store(false, Ordering::Relaxed);
@@ -180,6 +212,6 @@ mod tests {
 
     #[test]
     fn an_empty_recording_ends() {
-        assert_eq!(replay(&[], &Arc::default()).next_frame().unwrap(), None);
+        assert_eq!(replay(&[], 1.0, &Arc::default()).next_frame().unwrap(), None);
     }
 }

@@ -3,6 +3,7 @@
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -13,34 +14,34 @@ use locoman_protocol::messages::{Mode, RobotState, SimTruth};
 use locoman_protocol::{Endpoints, Link, Subscription};
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
-use locoman_vision::source::{FrameSource, SourceError};
-use locoman_vision::track::{Tracker, TrackerSettings};
+use locoman_vision::source::FrameSource;
+use locoman_vision::track::{Fusion, TrackerSettings};
 
 use crate::board::Board;
 use crate::command_loop::{self, Senders};
 use crate::config::Config;
 use crate::console::{self, Console};
-use crate::feed::{self, Feed};
 use crate::gamepad;
+use crate::gather::Gather;
 use crate::latency::Stage;
 use crate::latest::lock;
+use crate::node::{Remotes, described};
+use crate::observe::Observer;
 use crate::pilot::{Note, Pilot};
 use crate::recorder::{Item, Recorder, Tap};
-use crate::replay::Replay;
-use crate::sources;
+use crate::sight::{Counters, Equipment, Outlook, SIGHTINGS, Sight, spawn};
+use crate::solving::{self, Solver};
+use crate::sources::Frames;
 use crate::stop::StopButton;
-use crate::tracking;
 
-/// The first frame of a replay is due this long after the start: time to connect.
-const REPLAY_LEAD_NS: u64 = 300_000_000;
+/// Where camera nodes look for a station.
+const LISTEN: &str = "tcp/0.0.0.0:7449";
 
 /// Where the operator's motion comes from.
 #[derive(Debug, Clone)]
 pub enum Operator {
-    /// A recording, over and over.
-    Replay(PathBuf),
-    /// The cameras of the rig.
-    Cameras,
+    /// Images, of the cameras that are read here; others may be read by camera nodes.
+    Tracked(Frames),
     /// Nobody is tracked: joystick and console only.
     Joystick,
 }
@@ -54,17 +55,34 @@ pub struct Options {
     pub rig: PathBuf,
     pub shells: PathBuf,
     pub robot: String,
-    pub endpoints: Endpoints,
+    /// Where camera nodes find this station; empty: the default place if the rig has remote cameras.
+    pub listen: Vec<String>,
+    pub connect: Vec<String>,
     pub console: String,
     pub auto_engage: Option<Mode>,
     pub record: Option<PathBuf>,
     pub seconds: Option<f64>,
 }
 
-/// A thread that tracks, and the one that feeds it.
+/// What is needed to look, checked.
+struct Prepared {
+    rig: Rig,
+    shells: ShellSet,
+    /// `None`: camera nodes read all cameras.
+    source: Option<Box<dyn FrameSource>>,
+}
+
+/// The threads that look, and the one that solves.
 struct Eyes {
-    feed: JoinHandle<Result<(), SourceError>>,
-    tracker: JoinHandle<()>,
+    sight: Option<Sight>,
+    solver: JoinHandle<()>,
+    remotes: Option<Remotes>,
+}
+
+impl Eyes {
+    fn finished(&self) -> bool {
+        self.sight.as_ref().is_some_and(Sight::finished) || self.solver.is_finished()
+    }
 }
 
 /// Runs until `interrupted` (or the time is over, or a camera or the recorder fails).
@@ -75,7 +93,7 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     board.hold_replay.store(options.auto_engage.is_some(), Ordering::Relaxed);
     let sight = match &options.operator {
         Operator::Joystick => None,
-        operator => Some(open_eyes(operator, options, &board)?),
+        Operator::Tracked(frames) => Some(prepare(frames, options, &board)?),
     };
     let listener = TcpListener::bind(&options.console).map_err(|error| {
         anyhow!(
@@ -91,13 +109,15 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
         }
         None => (None, Tap::default()),
     };
-    let link = Link::open(&options.robot, &options.endpoints)?;
+    let endpoints =
+        Endpoints { listen: listen_at(options, sight.as_ref()), connect: options.connect.clone() };
+    let link = Link::open(&options.robot, &endpoints)?;
     let subscriptions = listen(&link, &board, &tap)?;
     let stop = Arc::new(StopButton::new(link.sender()?, Arc::clone(&board)));
-    let (rig, eyes) = match sight {
-        Some((tracker, source)) => {
-            let rig = tracker.rig().clone();
-            (Some(rig), Some(start_eyes(tracker, source, &link, &board, &tap, &config)?))
+    let (view, eyes) = match sight {
+        Some(prepared) => {
+            let view = (prepared.rig.clone(), prepared.shells.clone());
+            (Some(view), Some(start_eyes(prepared, &link, &board, &tap, &config)?))
         }
         None => (None, None),
     };
@@ -111,7 +131,7 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     let console = Console {
         board: Arc::clone(&board),
         stop,
-        rig,
+        view,
         config: config.console,
         silent_ms: config.command.robot_silent_ms,
         urdf: options.configs.join("robot/locoman.urdf"),
@@ -124,9 +144,10 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     board.end();
     drop(server);
     let ended = eyes.map_or(Ok(()), |eyes| {
-        let fed = eyes.feed.join().unwrap_or(Ok(()));
-        let _ = eyes.tracker.join();
-        fed
+        drop(eyes.remotes);
+        let ended = eyes.sight.map_or(Ok(()), Sight::join);
+        let _ = eyes.solver.join();
+        ended
     });
     let _ = commands.join();
     drop(subscriptions);
@@ -143,45 +164,74 @@ pub fn run(options: &Options, interrupted: &mpsc::Receiver<()>) -> Result<()> {
     Ok(recorded?)
 }
 
-/// The tracker and the frames, checked.
-fn open_eyes(
-    operator: &Operator,
-    options: &Options,
-    board: &Board,
-) -> Result<(Tracker, Box<dyn FrameSource>)> {
+/// Where camera nodes find this station.
+fn listen_at(options: &Options, sight: Option<&Prepared>) -> Vec<String> {
+    let nodes = sight.is_some_and(|prepared| here(&prepared.rig).contains(&false));
+    if nodes && options.listen.is_empty() { vec![LISTEN.to_owned()] } else { options.listen.clone() }
+}
+
+/// Rig, shells and frames, checked.
+fn prepare(frames: &Frames, options: &Options, board: &Board) -> Result<Prepared> {
     let rig = Rig::load(&options.rig)?;
     let shells = ShellSet::load(&options.shells)?;
-    let source: Box<dyn FrameSource> = match operator {
-        Operator::Replay(path) => {
-            sources::check(path)?;
-            let (path, rig) = (path.clone(), rig.clone());
-            let reopen = Box::new(move || sources::recording(&path, &rig));
-            Box::new(Replay::open(reopen, monotonic_ns() + REPLAY_LEAD_NS, Arc::clone(&board.hold_replay))?)
-        }
-        Operator::Cameras | Operator::Joystick => sources::cameras(&rig)?,
+    let here = here(&rig);
+    let source = if here.contains(&true) {
+        Some(frames.open(&rig, &here, monotonic_ns(), &board.hold_replay)?)
+    } else {
+        None
     };
-    Ok((Tracker::new(rig, shells, TrackerSettings::default())?, source))
+    Ok(Prepared { rig, shells, source })
+}
+
+/// Which cameras are read here.
+fn here(rig: &Rig) -> Vec<bool> {
+    rig.sources.iter().map(|source| !source.remote).collect()
 }
 
 fn start_eyes(
-    tracker: Tracker,
-    source: Box<dyn FrameSource>,
+    prepared: Prepared,
     link: &Link,
     board: &Arc<Board>,
     tap: &Tap,
     config: &Config,
 ) -> Result<Eyes> {
-    let frames = Arc::new(Feed::new(tracker.rig().cameras.len()));
-    let feed = spawn("cameras", {
-        let (frames, board) = (Arc::clone(&frames), Arc::clone(board));
-        move || feed::run(source, &frames, &board.stop)
-    })?;
-    let tracker = spawn("tracker", {
-        let (board, tap) = (Arc::clone(board), tap.clone());
-        let (sender, predicted_max_ms) = (link.sender()?, config.tracking.predicted_max_ms);
-        move || tracking::run(tracker, &frames, &board, sender, &tap, predicted_max_ms)
-    })?;
-    Ok(Eyes { feed, tracker })
+    let Prepared { rig, shells, source } = prepared;
+    let settings = TrackerSettings::default();
+    let here = here(&rig);
+    let some_remote = here.contains(&false);
+    let counters = Arc::new(Counters::new(rig.cameras.iter().map(|camera| camera.id.clone()).collect()));
+    let _ = board.counters.set(Arc::clone(&counters));
+    let outlook = Arc::new(Outlook::new(Arc::clone(&board.stop)));
+    let (sightings, seen) = sync_channel(SIGHTINGS);
+    let remotes = some_remote
+        .then(|| Remotes::listen(link, &rig, &shells, &counters, sightings.clone()))
+        .transpose()?;
+    let solver = Solver {
+        gather: Gather::new(&rig.sync_groups, config.tracking.straggler_ms * 1_000_000),
+        fusion: Fusion::new(rig.clone(), shells.clone(), settings.clone()),
+        outlook: Arc::clone(&outlook),
+        counters: Arc::clone(&counters),
+        board: Arc::clone(board),
+        tap: tap.clone(),
+        senders: solving::Senders {
+            tracking: link.sender()?,
+            motions: some_remote.then(|| link.sender()).transpose()?,
+        },
+        observer: Observer::new(config.tracking.predicted_max_ms),
+    };
+    let solver = spawn("solver", move || solver.run(&seen))?;
+    let equipment = |source| Equipment {
+        rig: &rig,
+        shells: &shells,
+        settings: &settings,
+        here,
+        source,
+        now_ns: Arc::new(monotonic_ns),
+        to_station: Arc::new(Some),
+    };
+    let start = |source| Sight::start(equipment(source), &outlook, &counters, &sightings);
+    let sight = source.map(start).transpose()?;
+    Ok(Eyes { sight, solver, remotes })
 }
 
 /// Receives what robot and simulator say.
@@ -225,7 +275,7 @@ fn wait(options: &Options, interrupted: &mpsc::Receiver<()>, eyes: Option<&Eyes>
         if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
             return Ok(());
         }
-        if eyes.is_some_and(|eyes| eyes.feed.is_finished() || eyes.tracker.is_finished()) {
+        if eyes.is_some_and(Eyes::finished) {
             return Ok(());
         }
     }
@@ -233,8 +283,13 @@ fn wait(options: &Options, interrupted: &mpsc::Receiver<()>, eyes: Option<&Eyes>
 
 /// What the session was like, in a few lines.
 fn summarize(board: &Board) {
-    for camera in lock(&board.tracking).iter().flat_map(|tracking| &tracking.cameras) {
-        tracing::info!("camera {}: {} of {} frames dropped", camera.camera, camera.dropped, camera.frames);
+    for camera in board.counters.get().iter().flat_map(|counters| counters.stats(|_| 0)) {
+        let (id, dropped, frames) = (&camera.camera, camera.dropped, camera.frames);
+        let clock = camera.clock.map(|clock| format!(", {}", described(&clock))).unwrap_or_default();
+        tracing::info!(
+            "camera {id}: {dropped} of {frames} frames dropped, {} searched whole{clock}",
+            camera.searched_whole
+        );
     }
     let latency = lock(&board.latency);
     for stage in Stage::ALL {
@@ -257,8 +312,4 @@ fn attachments(options: &Options) -> Result<Vec<(String, String)>> {
         Ok((name.to_owned(), text))
     };
     files.into_iter().map(read).collect()
-}
-
-fn spawn<T: Send + 'static>(name: &str, run: impl FnOnce() -> T + Send + 'static) -> Result<JoinHandle<T>> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(run).context("cannot start a thread")
 }

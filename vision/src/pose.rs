@@ -218,7 +218,8 @@ impl Solver {
         prior: &Prior,
         settings: &SolverSettings,
     ) -> Result<Solution, Refusal> {
-        let minimum = self.work.refine(views, &prior.state, prior, settings).ok_or(Refusal::NothingSeen)?;
+        let nothing = self.nothing();
+        let minimum = self.work.refine(views, &prior.state, prior, settings).ok_or(nothing)?;
         let solution = self.conclude(views, &minimum, prior)?;
         if solution.cameras == 1 && solution.tags <= 2 {
             // Few tags in one view look alike from two sides. The mirrored pose must be clearly worse.

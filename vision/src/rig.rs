@@ -33,6 +33,9 @@ pub struct CameraSource {
     pub url: Option<String>,
     /// Which half of a side-by-side image (ZED over UVC) is this camera; the whole image if absent.
     pub half: Option<Half>,
+    /// A camera node on another machine reads this camera (`locoman-teleop detect`).
+    #[serde(default)]
+    pub remote: bool,
 }
 
 /// A half of a side-by-side stereo image.
@@ -240,7 +243,7 @@ source = { device = "/dev/video0", half = "left" }
         assert_eq!(sut.cameras[0].focal_px, Vector2::new(700.0, 700.5));
         let k = [-0.1, 0.01, 0.0, 0.0, 0.002, 0.0, 0.0, 0.0];
         assert_eq!(sut.cameras[0].distortion, Distortion::RadTan(k));
-        assert_eq!(sut.sources[0].half, Some(Half::Left));
+        assert_eq!((sut.sources[0].half, sut.sources[0].remote), (Some(Half::Left), false));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::image::Frame;
 use crate::rig::Rig;
 pub use folder::ImageFolder;
 pub use recording::Recording;
-pub use set::{FrameSet, FrameSets, mean_ns};
+pub use set::{FrameSet, FrameSets, SYNC_TOLERANCE_NS, mean_ns};
 pub use video::VideoSource;
 
 /// Delivers the frames of all cameras of a rig, by rising capture time.

@@ -30,6 +30,7 @@ use rayon::prelude::*;
 
 use crate::detect::DetectorError;
 use crate::image::Frame;
+pub use crate::pose::Matrix18;
 use crate::rig::Rig;
 use crate::shells::ShellSet;
 use crate::source::FrameSet;
@@ -39,7 +40,7 @@ pub use filter::{FilterSettings, Manoeuvre, Motion};
 pub use fusion::{Fusion, Motions};
 pub use scout::Scout;
 pub use settings::TrackerSettings;
-pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TrackUpdate, Verdict};
+pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};
 
 /// Follows all shells of a set with all cameras of a rig, one set of frames after the other.
 #[derive(Debug)]

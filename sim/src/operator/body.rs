@@ -36,6 +36,17 @@ pub struct Limb {
     pub stripes: f32,
 }
 
+impl Limb {
+    /// Carried to another place.
+    pub fn moved(&self, by: &Isometry3<f64>) -> Self {
+        let shape = match self.shape {
+            Shape::Capsule { a, b, radius_m } => Shape::Capsule { a: by * a, b: by * b, radius_m },
+            Shape::Ellipsoid { pose, radii_m } => Shape::Ellipsoid { pose: by * pose, radii_m },
+        };
+        Self { shape, ..*self }
+    }
+}
+
 const SKIN: (f32, f32) = (0.60, 0.0);
 const SWEATER: (f32, f32) = (0.33, 0.22);
 const TROUSERS: (f32, f32) = (0.17, 0.0);
@@ -68,6 +79,28 @@ pub fn limbs(posture: &Posture, home: &Posture) -> Vec<Limb> {
     {
         let shoulder = trunk(-0.03, side * 0.2, 1.42);
         arm(&mut limbs, shoulder, posture.of(palm), posture.of(thumb), side);
+    }
+    limbs
+}
+
+/// A forearm with its hand upright, in a frame with x to the right, y down and its origin in the palm's middle.
+pub fn raised_hand() -> Vec<Limb> {
+    let mut limbs = vec![
+        Limb {
+            shape: Shape::Ellipsoid {
+                pose: Isometry3::identity(),
+                radii_m: Vector3::new(0.045, 0.055, 0.018),
+            },
+            albedo: SKIN.0,
+            stripes: SKIN.1,
+        },
+        capsule(Point3::new(0.0, 0.05, 0.0), Point3::new(0.02, 0.10, 0.005), 0.028, SKIN),
+        capsule(Point3::new(0.02, 0.10, 0.005), Point3::new(0.10, 0.40, 0.03), 0.038, SWEATER),
+        capsule(Point3::new(0.03, 0.03, 0.0), Point3::new(0.075, -0.035, -0.01), 0.012, SKIN),
+    ];
+    for finger in [-1.5, -0.5, 0.5, 1.5] {
+        let (x, tip) = (0.021 * finger, -0.135 + 0.006 * f64::abs(finger + 0.3));
+        limbs.push(capsule(Point3::new(x, -0.03, 0.0), Point3::new(1.3 * x, tip, -0.01), 0.0095, SKIN));
     }
     limbs
 }

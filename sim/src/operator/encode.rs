@@ -5,14 +5,12 @@ use opencv::imgcodecs;
 
 use super::studio::Picture;
 
-/// Compression without visible loss; corner positions shift by less than 0.01 px.
-const JPEG_QUALITY: i32 = 92;
 /// Fast: noise does not compress anyway.
 const PNG_LEVEL: i32 = 1;
 
-/// As a gray JPEG file.
+/// As a gray JPEG file, of the scene's quality.
 pub fn jpeg(picture: &Picture) -> opencv::Result<Vec<u8>> {
-    encode(picture, ".jpg", &[imgcodecs::IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    encode(picture, ".jpg", &[imgcodecs::IMWRITE_JPEG_QUALITY, picture.jpeg_quality])
 }
 
 /// As a gray PNG file.

@@ -7,6 +7,9 @@ pub const CELLS: usize = 10;
 /// Side of the printed tag, margin included, relative to the side of its black square.
 pub const MARGIN_RATIO: f64 = CELLS as f64 / 8.0;
 
+/// How many tags the family has.
+pub const IDS: u32 = 587;
+
 /// A printed tag: row 0 on top, column 0 on the left of the viewer; `true` is white.
 pub type Bitmap = [[bool; CELLS]; CELLS];
 

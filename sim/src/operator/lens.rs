@@ -67,4 +67,9 @@ impl PixelRays {
             self.origin[1] + x * self.along_x[1] + y * self.along_y[1],
         ]
     }
+
+    /// The rays through the pixel's four corners.
+    pub fn corners(&self) -> [Ray; 4] {
+        [self.at(0.0, 0.0), self.at(1.0, 0.0), self.at(0.0, 1.0), self.at(1.0, 1.0)]
+    }
 }

@@ -1,13 +1,15 @@
 //! The operator's side without cameras: images of tag shells along a scripted motion, with the truth.
 //!
 //! ```text
-//! scene file ─► motion ─► posture ─► view (shells, limbs) ─► render ─► sensor ─► encode ─► output
-//! rig file ───► lens (rays), room ─────────────────────────────┘
+//! scene file ─► motion, event ─► stage ─► course ─► view (shells, limbs) ─► render ─► sensor ─► encode ─► output
+//! rig file ───► shutter (rows), lens (rays), room ───────────────────┘
 //! shells file ► solid ─► ink
 //! ```
 
 pub mod body;
+pub mod course;
 pub mod encode;
+pub mod event;
 pub mod ink;
 pub mod lens;
 pub mod motion;
@@ -15,11 +17,15 @@ pub mod output;
 pub mod render;
 pub mod room;
 pub mod scene;
+pub mod schedule;
 pub mod sensor;
+pub mod shutter;
 pub mod sight;
 pub mod solid;
+pub mod stage;
 pub mod studio;
 pub mod view;
+pub mod wander;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +40,10 @@ use rayon::prelude::*;
 use motion::Body;
 use output::{Folder, Image, Instant, Output, Recording, TruthFile};
 use scene::Scene;
+use schedule::Moment;
 use studio::Studio;
+
+pub use schedule::{FIRST_CAPTURE_NS, Schedule};
 
 /// Arguments of `locoman-sim operator`.
 #[derive(Debug, clap::Args)]
@@ -68,10 +77,8 @@ pub struct Args {
     pub seed: u64,
 }
 
-/// Capture time of the first picture: a round number, so that times are easy to read.
-pub const FIRST_CAPTURE_NS: u64 = 1_000_000_000;
 /// Instants that are rendered before any is written: enough to keep many cores busy, few to hold.
-const BATCH: u64 = 8;
+const BATCH: usize = 8;
 
 /// The files that a rendering is made from.
 #[derive(Debug)]
@@ -104,41 +111,6 @@ impl Inputs {
     }
 }
 
-/// When pictures are taken.
-#[derive(Debug, Clone, Copy)]
-pub struct Schedule {
-    /// Pictures of each camera.
-    pub count: u64,
-    /// Pictures a second.
-    pub rate_hz: f64,
-}
-
-impl Schedule {
-    /// As many as fit into a length of time.
-    pub fn new(seconds: f64, rate_hz: f64) -> anyhow::Result<Self> {
-        anyhow::ensure!(
-            (0.1..=1000.0).contains(&rate_hz),
-            "--rate {rate_hz}: must lie between 0.1 and 1000 images a second"
-        );
-        let count = (seconds * rate_hz).round();
-        anyhow::ensure!(
-            (1.0..1e7).contains(&count),
-            "--seconds {seconds} at {rate_hz} Hz are {count} images: give a longer time"
-        );
-        Ok(Self { count: count as u64, rate_hz })
-    }
-
-    /// Scene time of a picture.
-    pub fn time_s(&self, number: u64) -> f64 {
-        number as f64 / self.rate_hz
-    }
-
-    /// Capture time of a picture.
-    pub fn capture_ns(&self, number: u64) -> u64 {
-        FIRST_CAPTURE_NS + (self.time_s(number) * 1e9).round() as u64
-    }
-}
-
 /// Runs `locoman-sim operator`.
 pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let standard = Inputs::standard(configs);
@@ -150,6 +122,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let studio = inputs.studio(args.seed)?;
     let seconds = args.seconds.unwrap_or(studio.scene().motion.period_s);
     let schedule = Schedule::new(seconds, args.rate)?;
+    report_paces(&studio, seconds);
 
     let mut outputs: Vec<Box<dyn Output>> = Vec::new();
     if let Some(path) = &args.output {
@@ -202,17 +175,17 @@ pub fn render_to(
 ) -> anyhow::Result<()> {
     let bodies: Vec<Body> = studio.solids().iter().map(|solid| solid.body).collect();
     let cameras: Vec<&str> = studio.cameras().map(|camera| camera.id.as_str()).collect();
-    let progress = progress_bar(schedule.count);
-    for start in (0..schedule.count).step_by(BATCH as usize) {
-        let numbers = start..(start + BATCH).min(schedule.count);
-        let pictures = numbers
-            .clone()
-            .flat_map(|number| (0..cameras.len()).map(move |camera| (number, camera)))
-            .collect::<Vec<_>>();
+    let moments = schedule.moments(studio);
+    let progress = progress_bar(moments.len() as u64);
+    for (batch, moments) in moments.chunks(BATCH).enumerate() {
+        let pictures: Vec<(&Moment, usize)> = moments
+            .iter()
+            .flat_map(|moment| moment.cameras.iter().map(move |camera| (moment, *camera)))
+            .collect();
         let mut images = pictures
             .into_par_iter()
-            .map(|(number, camera)| -> anyhow::Result<Image<'_>> {
-                let picture = studio.picture(camera, schedule.time_s(number), number);
+            .map(|(moment, camera)| -> anyhow::Result<Image<'_>> {
+                let picture = studio.picture(camera, moment.time_s, moment.frame);
                 Ok(Image {
                     camera: cameras[camera],
                     jpeg: formats.jpeg.then(|| encode::jpeg(&picture)).transpose()?,
@@ -221,13 +194,13 @@ pub fn render_to(
             })
             .collect::<anyhow::Result<Vec<_>>>()?
             .into_iter();
-        for number in numbers {
+        for (i, moment) in moments.iter().enumerate() {
             let instant = Instant {
-                capture_ns: schedule.capture_ns(number),
-                number,
-                posture: studio.scene().motion.posture(schedule.time_s(number)),
+                capture_ns: moment.capture_ns,
+                number: (batch * BATCH + i) as u64,
+                posture: studio.true_posture(moment.time_s),
                 bodies: &bodies,
-                images: images.by_ref().take(cameras.len()).collect(),
+                images: images.by_ref().take(moment.cameras.len()).collect(),
             };
             for output in outputs.iter_mut() {
                 output.add(&instant)?;
@@ -237,6 +210,22 @@ pub fn render_to(
     }
     progress.finish_and_clear();
     Ok(())
+}
+
+/// Says how fast each shell moves.
+fn report_paces(studio: &Studio, seconds: f64) {
+    for solid in studio.solids() {
+        let pace = studio.scene().motion.pace(solid.body, 0.0, seconds);
+        tracing::info!(
+            "{}: at most {:.2} m/s, {:.0} deg/s, {:.1} m/s2; RMS {:.2} m/s, {:.0} deg/s",
+            solid.body.name(),
+            pace.peak_m_s,
+            pace.peak_rad_s.to_degrees(),
+            pace.peak_m_s2,
+            pace.rms_m_s,
+            pace.rms_rad_s.to_degrees()
+        );
+    }
 }
 
 /// Draws on a terminal only.

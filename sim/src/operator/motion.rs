@@ -1,13 +1,15 @@
 //! The scripted motion: where each shell is at any time, as a closed formula.
 //!
-//! Every body rests at its home pose; terms of smooth waves under smooth windows are added to it. All terms
-//! vanish at both ends of the period, so that the script repeats without a seam. The result is twice
-//! continuously differentiable: velocity and acceleration exist everywhere.
+//! Every body rests at its home pose; terms of smooth waves under smooth windows, and random reaches if the scene
+//! asks for them, are added to it. All of them vanish at both ends of the period, so that the script repeats
+//! without a seam. The result is twice continuously differentiable: velocity and acceleration exist everywhere.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
+
+use super::wander::{Offset, Wander};
 
 /// The five rigid bodies that wear shells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
@@ -129,7 +131,7 @@ impl Term {
 }
 
 /// 0 below 0, 1 above 1, and in between the quintic with two vanishing derivatives at both ends.
-fn smoothstep(x: f64) -> f64 {
+pub(super) fn smoothstep(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * x * (x * (6.0 * x - 15.0) + 10.0)
 }
@@ -192,9 +194,26 @@ pub struct Motion {
     pub right_thumb: Hinge,
     /// Left thumb on the left palm.
     pub left_thumb: Hinge,
-    /// What moves.
-    #[serde(rename = "term")]
+    /// What moves; nothing if there is none.
+    #[serde(default, rename = "term")]
     pub terms: Vec<Term>,
+    /// Random motion on top.
+    pub wander: Option<Wander>,
+}
+
+/// How fast a body moves over a stretch of time.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pace {
+    /// Highest speed of its origin.
+    pub peak_m_s: f64,
+    /// Root mean square of that speed.
+    pub rms_m_s: f64,
+    /// Highest angular speed.
+    pub peak_rad_s: f64,
+    /// Root mean square of that speed.
+    pub rms_rad_s: f64,
+    /// Highest acceleration of its origin.
+    pub peak_m_s2: f64,
 }
 
 /// `world_from_shell` of every body at one instant.
@@ -218,9 +237,29 @@ impl Motion {
             self.moved(Body::Torso, &self.torso, t_s),
             right_palm,
             left_palm,
-            right_palm * self.right_thumb.palm_from_thumb(self.sum(Body::RightThumb, Axis::Open, t_s)),
-            left_palm * self.left_thumb.palm_from_thumb(self.sum(Body::LeftThumb, Axis::Open, t_s)),
+            right_palm * self.right_thumb.palm_from_thumb(self.opening_rad(Body::RightThumb, t_s)),
+            left_palm * self.left_thumb.palm_from_thumb(self.opening_rad(Body::LeftThumb, t_s)),
         ])
+    }
+
+    /// How fast a body moves between two times, sampled every millisecond.
+    pub fn pace(&self, body: Body, begin_s: f64, end_s: f64) -> Pace {
+        const STEP_S: f64 = 1e-3;
+        let count = ((end_s - begin_s) / STEP_S).max(1.0) as usize;
+        let mut pace = Pace::default();
+        let mut last: Option<Vector3<f64>> = None;
+        for i in 0..count {
+            let (linear, angular) = self.velocity(body, begin_s + STEP_S * i as f64);
+            pace.peak_m_s = pace.peak_m_s.max(linear.norm());
+            pace.peak_rad_s = pace.peak_rad_s.max(angular.norm());
+            pace.rms_m_s += linear.norm_squared() / count as f64;
+            pace.rms_rad_s += angular.norm_squared() / count as f64;
+            if let Some(last) = last {
+                pace.peak_m_s2 = pace.peak_m_s2.max((linear - last).norm() / STEP_S);
+            }
+            last = Some(linear);
+        }
+        Pace { rms_m_s: pace.rms_m_s.sqrt(), rms_rad_s: pace.rms_rad_s.sqrt(), ..pace }
     }
 
     /// Velocity of a shell's origin (m/s) and angular velocity (rad/s), both in world axes.
@@ -242,7 +281,19 @@ impl Motion {
         let home = home.isometry();
         let turn = UnitQuaternion::from_euler_angles(sum(Axis::Roll), sum(Axis::Pitch), sum(Axis::Yaw));
         let shift = Vector3::new(sum(Axis::X), sum(Axis::Y), sum(Axis::Z));
+        let (turn, shift) = match self.wandered(body, t_s) {
+            Some(offset) => (UnitQuaternion::new(offset.turn_rad) * turn, shift + offset.shift_m),
+            None => (turn, shift),
+        };
         Isometry3::from_parts(Translation3::from(home.translation.vector + shift), turn * home.rotation)
+    }
+
+    fn opening_rad(&self, body: Body, t_s: f64) -> f64 {
+        self.sum(body, Axis::Open, t_s) + self.wandered(body, t_s).map_or(0.0, |offset| offset.open_rad)
+    }
+
+    fn wandered(&self, body: Body, t_s: f64) -> Option<Offset> {
+        self.wander.as_ref().map(|wander| wander.offset(body, t_s))
     }
 
     fn sum(&self, body: Body, axis: Axis, t_s: f64) -> f64 {
@@ -291,6 +342,7 @@ mod tests {
                 term(Body::RightPalm, Axis::Yaw, Wave::Square, 0.3),
                 term(Body::RightThumb, Axis::Open, Wave::Rise, 0.8),
             ],
+            wander: None,
         }
     }
 

@@ -2,16 +2,16 @@
 //!
 //! Work goes where the picture needs it. A tile without shells is probed every 4 pixels and interpolated
 //! where all four probes agree. A tile with shells is probed at each pixel's corners at both ends of the
-//! exposure; where all eight agree the pixel is their mean, elsewhere 16 samples are spread over the pixel
-//! and over the exposure (stratified in space, permuted in time), which gives motion blur and smooth edges.
+//! exposure, and in between where something moves far; where all agree the pixel is their mean, elsewhere 16
+//! samples are spread over the pixel and over the exposure (stratified in space, permuted in time), which gives
+//! motion blur and smooth edges.
 
 use super::lens::{PixelRays, RayTable};
-use super::view::{Bounds, Hit, Lamp, View};
+use super::shutter::SLICES;
+use super::view::{BAND_ROWS, Bounds, Candidates, Hit, Lamp, Pace, View};
 
-/// Slices of the exposure.
-pub const SLICES: usize = 8;
 /// Side of a tile in pixels.
-const TILE: usize = 16;
+const TILE: usize = BAND_ROWS;
 /// Distance of probes in a tile without shells.
 const STEP: usize = 4;
 /// Samples along each side of a pixel at an edge.
@@ -32,13 +32,6 @@ pub struct Exposure<'a> {
     pub width: usize,
 }
 
-/// What a tile may show.
-#[derive(Debug, Default, Clone)]
-struct Tile {
-    facets: Vec<u16>,
-    limbs: Vec<u16>,
-}
-
 /// The light on each pixel, by rows.
 pub fn render(exposure: &Exposure<'_>) -> Vec<f32> {
     let mut light = exposure.background.to_vec();
@@ -57,31 +50,34 @@ pub fn render(exposure: &Exposure<'_>) -> Vec<f32> {
     light
 }
 
-fn sort_into_tiles(exposure: &Exposure<'_>, columns: usize, rows: usize) -> Vec<Tile> {
-    let mut tiles = vec![Tile::default(); columns * rows];
-    let (facets, limbs) = exposure.view.bounds();
-    let covered = |bounds: &Bounds| {
-        let span = |low: f64, high: f64, count: usize| {
-            let tile = TILE as f64;
-            ((low / tile).floor().max(0.0) as usize)
-                ..(((high / tile).floor() + 1.0).max(0.0) as usize).min(count)
-        };
-        (span(bounds.left, bounds.right, columns), span(bounds.top, bounds.bottom, rows))
+fn sort_into_tiles(exposure: &Exposure<'_>, columns: usize, rows: usize) -> Vec<Candidates> {
+    let mut tiles = vec![Candidates::default(); columns * rows];
+    let span = |low: f64, high: f64, count: usize| {
+        let tile = TILE as f64;
+        ((low / tile).floor().max(0.0) as usize)..(((high / tile).floor() + 1.0).max(0.0) as usize).min(count)
     };
-    for (number, bounds) in &facets {
-        let (across, down) = covered(bounds);
-        for row in down {
-            for column in across.clone() {
+    let across = |bounds: &Bounds| span(bounds.left, bounds.right, columns);
+    let down = |bounds: &Bounds| span(bounds.top, bounds.bottom, rows);
+    for (number, bounds) in &exposure.view.placed_facets() {
+        for row in down(bounds) {
+            for column in across(bounds) {
                 tiles[row * columns + column].facets.push(*number);
             }
         }
     }
-    for (number, bounds) in &limbs {
-        let (across, down) = covered(bounds);
-        for row in down {
-            for column in across.clone() {
-                tiles[row * columns + column].limbs.push(*number);
+    let (mut band, mut limbs) = (0, exposure.view.placed_limbs(0));
+    for (row, line) in tiles.chunks_mut(columns).enumerate() {
+        let own = exposure.view.band_of(row * TILE);
+        if own != band {
+            (band, limbs) = (own, exposure.view.placed_limbs(own));
+        }
+        for (number, bounds) in limbs.iter().filter(|(_, bounds)| down(bounds).contains(&row)) {
+            for column in across(bounds) {
+                line[column].limbs.push(*number);
             }
+        }
+        for tile in line {
+            tile.band = band;
         }
     }
     tiles
@@ -97,39 +93,44 @@ struct Area {
 }
 
 impl Area {
-    fn render_shells(&self, exposure: &Exposure<'_>, tile: &Tile, light: &mut [f32]) {
+    fn render_shells(&self, exposure: &Exposure<'_>, tile: &Candidates, light: &mut [f32]) {
         let stride = TILE + 1;
-        let mut probes = [[None::<Hit>; 2]; (TILE + 1) * (TILE + 1)];
+        let pace = tile.facets.iter().map(|facet| exposure.view.pace_of(*facet)).max();
+        let mut probes = [Probe::default(); (TILE + 1) * (TILE + 1)];
         for row in self.top..=self.bottom {
             for column in self.left..=self.right {
                 let ray = exposure.rays.corner(column, row);
                 let at = (row - self.top) * stride + column - self.left;
-                probes[at] = [0, SLICES - 1]
-                    .map(|slice| exposure.view.trace(&tile.facets, &tile.limbs, ray, slice, exposure.lamp));
+                let own_row = row.min(self.bottom - 1);
+                let trace = |slice| exposure.view.trace(tile, ray, own_row, slice, exposure.lamp);
+                probes[at] = Probe::new(pace.unwrap_or(Pace::Still), trace);
             }
         }
+        let mut near = Candidates::default();
         for row in self.top..self.bottom {
             for column in self.left..self.right {
                 let at = (row - self.top) * stride + column - self.left;
-                let corners = [probes[at], probes[at + 1], probes[at + stride], probes[at + stride + 1]];
+                let corners = [&probes[at], &probes[at + 1], &probes[at + stride], &probes[at + stride + 1]];
                 let pixel = &mut light[row * exposure.width + column];
-                match uniform(corners.iter().flatten()) {
-                    Uniform::Nothing => {}
-                    Uniform::Surface(mean) => *pixel = mean,
-                    Uniform::No => {
+                let agree = corners.iter().all(|probe| probe.steady);
+                match uniform(corners.iter().flat_map(|probe| &probe.ends)) {
+                    Uniform::Nothing if agree => {}
+                    Uniform::Surface(mean) if agree => *pixel = mean,
+                    _ => {
                         let rays = exposure.rays.pixel(column, row);
-                        *pixel = sampled(exposure, tile, &rays, (column, row), *pixel);
+                        exposure.view.narrow(tile, &rays.corners(), &mut near);
+                        *pixel = sampled(exposure, &near, &rays, (column, row), *pixel);
                     }
                 }
             }
         }
     }
 
-    fn render_limbs(&self, exposure: &Exposure<'_>, tile: &Tile, light: &mut [f32]) {
+    fn render_limbs(&self, exposure: &Exposure<'_>, tile: &Candidates, light: &mut [f32]) {
         const PROBES: usize = TILE / STEP + 1;
         let probe = |column: usize, row: usize| {
             let ray = exposure.rays.corner(column, row);
-            exposure.view.trace(&[], &tile.limbs, ray, SLICES / 2, exposure.lamp)
+            exposure.view.trace(tile, ray, row, SLICES / 2, exposure.lamp)
         };
         let place = |i: usize, start: usize, end: usize| (start + i * STEP).min(end);
         let mut probes = [[None::<Hit>; PROBES]; PROBES];
@@ -168,7 +169,7 @@ impl Area {
         }
     }
 
-    fn render_each(&self, exposure: &Exposure<'_>, tile: &Tile, light: &mut [f32]) {
+    fn render_each(&self, exposure: &Exposure<'_>, tile: &Candidates, light: &mut [f32]) {
         for row in self.top..self.bottom {
             for column in self.left..self.right {
                 let rays = exposure.rays.pixel(column, row);
@@ -178,12 +179,42 @@ impl Area {
                     .map(|(x, y)| {
                         exposure
                             .view
-                            .trace(&[], &tile.limbs, rays.at(x, y), SLICES / 2, exposure.lamp)
+                            .trace(tile, rays.at(x, y), row, SLICES / 2, exposure.lamp)
                             .map_or(behind, |hit| hit.light)
                     })
                     .iter()
                     .sum::<f32>()
                     / 4.0;
+            }
+        }
+    }
+}
+
+/// What a corner of a pixel shows during the exposure.
+#[derive(Debug, Clone, Copy)]
+struct Probe {
+    /// As it begins, and as it ends.
+    ends: [Option<Hit>; 2],
+    /// Whether nothing else shows in between.
+    steady: bool,
+}
+
+impl Default for Probe {
+    fn default() -> Self {
+        Self { ends: [None; 2], steady: true }
+    }
+}
+
+impl Probe {
+    fn new(pace: Pace, trace: impl Fn(usize) -> Option<Hit>) -> Self {
+        let first = trace(0);
+        match pace {
+            Pace::Still => Self { ends: [first; 2], steady: true },
+            Pace::Slow => Self { ends: [first, trace(SLICES - 1)], steady: true },
+            Pace::Fast => {
+                let key = first.map(|hit| hit.key);
+                let steady = (1..SLICES - 1).all(|slice| trace(slice).map(|hit| hit.key) == key);
+                Self { ends: [first, trace(SLICES - 1)], steady }
             }
         }
     }
@@ -216,7 +247,7 @@ fn uniform<'a>(hits: impl Iterator<Item = &'a Option<Hit>>) -> Uniform {
 /// The mean of 16 samples, one in each cell of a 4 x 4 grid, each at another slice of the exposure.
 fn sampled(
     exposure: &Exposure<'_>,
-    tile: &Tile,
+    among: &Candidates,
     rays: &PixelRays,
     (column, row): (usize, usize),
     behind: f32,
@@ -232,7 +263,7 @@ fn sampled(
         let x = ((cell % GRID) as f32 + jitter(random)) / GRID as f32;
         let y = ((cell / GRID) as f32 + jitter(random >> 16)) / GRID as f32;
         let slice = (order / (GRID * GRID / SLICES) + turn) % SLICES;
-        let hit = exposure.view.trace(&tile.facets, &tile.limbs, rays.at(x, y), slice, exposure.lamp);
+        let hit = exposure.view.trace(among, rays.at(x, y), row, slice, exposure.lamp);
         sum += hit.map_or(behind, |hit| hit.light);
     }
     sum / (GRID * GRID) as f32

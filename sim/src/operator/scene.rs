@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::event::Events;
 use super::motion::{Axis, Body, Motion};
 
 /// A scene file that cannot be used.
@@ -45,6 +46,22 @@ pub struct Scene {
     pub light: Light,
     /// How the cameras take it.
     pub sensor: Sensor,
+    /// Which cameras take their pictures later than the others.
+    #[serde(default, rename = "camera")]
+    pub cameras: Vec<Phase>,
+    /// What disturbs.
+    #[serde(default, rename = "event")]
+    pub events: Events,
+}
+
+/// A camera that is not synchronised with the rest; those that the rig exposes together with it share its phase.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Phase {
+    /// The camera's id in the rig file.
+    pub id: String,
+    /// How much later it takes its pictures; taken modulo the time between two pictures.
+    pub phase_s: f64,
 }
 
 /// One distant lamp, light from everywhere, and a gradient over the room.
@@ -65,7 +82,7 @@ pub struct Light {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
-    /// Time for which the shutter is open, centred on the capture time; global shutter.
+    /// Time for which each row is exposed, centred on the row's own time.
     pub exposure_s: f64,
     /// Standard deviation of the lens's Gaussian point-spread function, in pixels.
     pub defocus_px: f64,
@@ -79,6 +96,25 @@ pub struct Sensor {
     pub shot_noise: f64,
     /// Loss of light at a ray of 45 degrees from the optical axis.
     pub vignetting: f64,
+    /// Quality of JPEG pictures, from 1 to 100.
+    #[serde(default = "standard_jpeg_quality")]
+    pub jpeg_quality: i32,
+}
+
+/// Compression without visible loss; corner positions shift by less than 0.01 px.
+fn standard_jpeg_quality() -> i32 {
+    92
+}
+
+/// Longer exposures than this are mistakes of unit.
+pub(super) const MOST_EXPOSURE_S: f64 = 0.1;
+
+/// The first of some named values that is outside its range, in words.
+pub(super) fn out_of_range<'a>(ranges: impl IntoIterator<Item = (&'a str, f64, f64, f64)>) -> Option<String> {
+    ranges
+        .into_iter()
+        .find(|(_, value, low, high)| !(low..=high).contains(&value))
+        .map(|(name, value, low, high)| format!("{name} = {value} must lie between {low} and {high}"))
 }
 
 impl Scene {
@@ -99,6 +135,13 @@ impl Scene {
         let motion = &self.motion;
         if !(motion.period_s > 0.0 && motion.period_s.is_finite()) {
             return Some(format!("period_s = {} must be positive", motion.period_s));
+        }
+        if let Some(wander) = motion.wander.as_ref().filter(|wander| wander.end_s() > motion.period_s) {
+            return Some(format!(
+                "wander ends at {} s, after period_s = {}: end it before",
+                wander.end_s(),
+                motion.period_s
+            ));
         }
         for term in &motion.terms {
             let thumb = matches!(term.body, Body::RightThumb | Body::LeftThumb);
@@ -122,17 +165,16 @@ impl Scene {
         }
         let sensor = &self.sensor;
         let ranges = [
-            ("exposure_s", sensor.exposure_s, 0.0, 0.1),
+            ("exposure_s", sensor.exposure_s, 0.0, MOST_EXPOSURE_S),
             ("defocus_px", sensor.defocus_px, 0.0, 5.0),
             ("white_level", sensor.white_level, 1.0, 1000.0),
             ("black_level", sensor.black_level, 0.0, 100.0),
             ("read_noise", sensor.read_noise, 0.0, 50.0),
             ("shot_noise", sensor.shot_noise, 0.0, 10.0),
             ("vignetting", sensor.vignetting, 0.0, 1.0),
+            ("jpeg_quality", f64::from(sensor.jpeg_quality), 1.0, 100.0),
         ];
-        ranges
-            .iter()
-            .find(|(_, value, low, high)| !(low..=high).contains(&value))
-            .map(|(name, value, low, high)| format!("{name} = {value} must lie between {low} and {high}"))
+        let phases = self.cameras.iter().map(|camera| ("phase_s", camera.phase_s, 0.0, 10.0));
+        out_of_range(ranges.into_iter().chain(phases)).or_else(|| self.events.fault())
     }
 }

@@ -11,13 +11,14 @@ pub struct Developer {
     /// Grey levels per unit of light at each pixel.
     gain: Vec<f32>,
     /// One side of the symmetric blur kernel, its centre first.
-    kernel: [f32; RADIUS + 1],
+    kernel: Vec<f32>,
     /// Standard deviation of the noise at each grey level of signal.
     noise: [f32; 256],
 }
 
-/// The blur reaches this many pixels.
-const RADIUS: usize = 3;
+/// The blur reaches this many pixels, or this many standard deviations if that is farther.
+const LEAST_RADIUS_PX: usize = 3;
+const REACH: f64 = 3.5;
 
 /// One step of the splitmix64 generator: a well mixed function of its input.
 #[inline]
@@ -42,8 +43,9 @@ impl Developer {
             0.0 => f64::from(u8::from(i == 0)),
             sigma => (-0.5 * (i as f64 / sigma).powi(2)).exp(),
         };
-        let total = weight(0) + 2.0 * (1..=RADIUS).map(weight).sum::<f64>();
-        let kernel = std::array::from_fn(|i| (weight(i) / total) as f32);
+        let radius = LEAST_RADIUS_PX.max((REACH * sensor.defocus_px).ceil() as usize);
+        let total = weight(0) + 2.0 * (1..=radius).map(weight).sum::<f64>();
+        let kernel = (0..=radius).map(|i| (weight(i) / total) as f32).collect();
         let noise = std::array::from_fn(|level| {
             let signal = (level as f64 - sensor.black_level).max(0.0);
             (sensor.read_noise.powi(2) + sensor.shot_noise * signal).sqrt() as f32
@@ -51,8 +53,8 @@ impl Developer {
         Self { width, sensor: sensor.clone(), gain, kernel, noise }
     }
 
-    /// The picture; `seed` decides its noise.
-    pub fn develop(&self, light: &[f32], seed: u64) -> Vec<u8> {
+    /// The picture; `brightness` is a factor on the light, `seed` decides the noise.
+    pub fn develop(&self, light: &[f32], brightness: f32, seed: u64) -> Vec<u8> {
         let blurred = self.blur(light);
         let black = self.sensor.black_level as f32;
         let mut grey = vec![0; blurred.len()];
@@ -60,7 +62,7 @@ impl Developer {
         for (row, (line, (light, gain))) in grey.chunks_mut(self.width).zip(lines).enumerate() {
             let start = mix(seed ^ mix(row as u64));
             for (column, (pixel, (light, gain))) in line.iter_mut().zip(light.iter().zip(gain)).enumerate() {
-                let signal = black + light * gain;
+                let signal = black + light * gain * brightness;
                 let deviation = self.noise[(signal as usize).min(255)];
                 let noise = gaussian(mix(start.wrapping_add(column as u64)));
                 // A cast saturates at 0 and 255.
@@ -72,35 +74,43 @@ impl Developer {
 
     /// Convolution with the point-spread function, rows then columns; borders repeat the last pixel.
     fn blur(&self, light: &[f32]) -> Vec<f32> {
-        let [k0, k1, k2, k3] = self.kernel;
-        let width = self.width;
+        let (center, sides) = (self.kernel[0], &self.kernel[1..]);
+        let (width, radius) = (self.width, sides.len());
         let mut across = vec![0.0f32; light.len()];
-        let mut padded = vec![0.0f32; width + 2 * RADIUS];
+        let mut padded = vec![0.0f32; width + 2 * radius];
         for (line, out) in light.chunks(width).zip(across.chunks_mut(width)) {
-            padded[..RADIUS].fill(line[0]);
-            padded[RADIUS..RADIUS + width].copy_from_slice(line);
-            padded[RADIUS + width..].fill(line[width - 1]);
-            for (p, out) in padded.windows(2 * RADIUS + 1).zip(out) {
-                *out = k0 * p[3] + k1 * (p[2] + p[4]) + k2 * (p[1] + p[5]) + k3 * (p[0] + p[6]);
+            padded[..radius].fill(line[0]);
+            padded[radius..radius + width].copy_from_slice(line);
+            padded[radius + width..].fill(line[width - 1]);
+            let shifted = |by: usize| &padded[by..by + width];
+            scale(out, line, center);
+            for (i, weight) in sides.iter().enumerate() {
+                add_pair(out, shifted(radius - 1 - i), shifted(radius + 1 + i), *weight);
             }
         }
         let last = light.len() / width - 1;
-        let line = |row: usize, offset: isize| {
-            let row = row.saturating_add_signed(offset).min(last);
-            &across[row * width..(row + 1) * width]
-        };
+        let line = |row: usize| &across[row * width..(row + 1) * width];
         let mut down = vec![0.0f32; light.len()];
         for (row, out) in down.chunks_mut(width).enumerate() {
-            let l: [&[f32]; 2 * RADIUS + 1] =
-                std::array::from_fn(|i| line(row, i as isize - RADIUS as isize));
-            for (x, out) in out.iter_mut().enumerate() {
-                *out = k0 * l[3][x]
-                    + k1 * (l[2][x] + l[4][x])
-                    + k2 * (l[1][x] + l[5][x])
-                    + k3 * (l[0][x] + l[6][x]);
+            scale(out, line(row), center);
+            for (i, weight) in sides.iter().enumerate() {
+                let (above, below) = (row.saturating_sub(i + 1), (row + i + 1).min(last));
+                add_pair(out, line(above), line(below), *weight);
             }
         }
         down
+    }
+}
+
+fn scale(out: &mut [f32], line: &[f32], weight: f32) {
+    for (out, value) in out.iter_mut().zip(line) {
+        *out = weight * value;
+    }
+}
+
+fn add_pair(out: &mut [f32], a: &[f32], b: &[f32], weight: f32) {
+    for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
+        *out += weight * (a + b);
     }
 }
 

@@ -31,6 +31,19 @@ pub enum SolidError {
         /// What is wrong with the tag.
         source: InkError,
     },
+    /// A tag of a poster cannot be printed.
+    #[error("a poster of the scene cannot be printed")]
+    Poster(#[source] InkError),
+    /// A visitor of the scene would need more tags than the family has.
+    #[error(
+        "a visitor with other tags needs {needed}, but the shells leave {free} of the family: use tags = \"same\""
+    )]
+    Visitor {
+        /// As many as the operator wears.
+        needed: usize,
+        /// As many as he does not wear.
+        free: usize,
+    },
 }
 
 /// A tag on a facet.
@@ -84,6 +97,56 @@ impl Plane {
 /// The solids of a set of shells, in its order.
 pub fn solids(set: &ShellSet) -> Result<Vec<Solid>, SolidError> {
     set.shells.iter().map(|shell| solid(&set.family, shell)).collect()
+}
+
+/// A sheet with tags in a row, as a facet on its own; its frame is the poster's.
+pub fn sheet(ids: &[u32], size_m: f64) -> Result<Facet, SolidError> {
+    /// From centre to centre, in tag sides: room for a margin of a cell on each and of paper between.
+    const PITCH: f64 = 1.5;
+    let (middle, count) = (0.5 * (ids.len() as f64 - 1.0), ids.len() as f64);
+    let tags = ids
+        .iter()
+        .enumerate()
+        .map(|(i, &id)| {
+            Ok(PrintedTag {
+                id,
+                size_m,
+                center: Point2::new((i as f64 - middle) * PITCH * size_m, 0.0),
+                x_axis: [1.0, 0.0],
+                bitmap: ink::bitmap("tag36h11", id).map_err(SolidError::Poster)?,
+            })
+        })
+        .collect::<Result<Vec<_>, SolidError>>()?;
+    let (w, h) = (0.5 * count * PITCH * size_m, 0.5 * PITCH * size_m);
+    Ok(Facet { shell_from_facet: Isometry3::identity(), polygon: rectangle(w, h), tags })
+}
+
+/// A tag of a facet that hangs on its upper edge: its print, and the back of its paper.
+pub fn hanging(facet: &Facet, tag: &PrintedTag) -> [Facet; 2] {
+    const TURN_RAD: f64 = -50.0 * std::f64::consts::PI / 180.0;
+    /// So far before the facet, that the two do not cross at the edge.
+    const LIFT_M: f64 = 0.0005;
+    let half_m = 0.5 * tag.size_m * MARGIN_RATIO;
+    let facet_from_tag = Isometry3::from_parts(
+        Vector3::new(tag.center.x, tag.center.y, 0.0).into(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), tag.x_axis[1].atan2(tag.x_axis[0])),
+    );
+    let tag_from_hanging = Isometry3::translation(0.0, half_m, LIFT_M)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), TURN_RAD)
+        * Isometry3::translation(0.0, -half_m, 0.0);
+    let shell_from_front = facet.shell_from_facet * facet_from_tag * tag_from_hanging;
+    let about = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let upright = PrintedTag { center: Point2::origin(), x_axis: [1.0, 0.0], ..tag.clone() };
+    let polygon = rectangle(half_m, half_m);
+    [
+        Facet { shell_from_facet: shell_from_front, polygon: polygon.clone(), tags: vec![upright] },
+        Facet { shell_from_facet: shell_from_front * about, polygon, tags: Vec::new() },
+    ]
+}
+
+/// Half width, half height; counter-clockwise.
+fn rectangle(w: f64, h: f64) -> Vec<Point2<f64>> {
+    [(-w, -h), (w, -h), (w, h), (-w, h)].map(|(x, y)| Point2::new(x, y)).to_vec()
 }
 
 fn solid(family: &str, shell: &Shell) -> Result<Solid, SolidError> {
@@ -159,9 +222,7 @@ fn plane_of(shell_from_facet: &Isometry3<f64>) -> Plane {
 
 /// What is left of a facet's plane inside all the half-spaces (Sutherland and Hodgman's clipping).
 fn cut<'a>(shell_from_facet: &Isometry3<f64>, planes: impl Iterator<Item = &'a Plane>) -> Vec<Point2<f64>> {
-    let h = UNCUT_M;
-    let mut polygon: Vec<Point2<f64>> =
-        [(-h, -h), (h, -h), (h, h), (-h, h)].map(|(x, y)| Point2::new(x, y)).to_vec();
+    let mut polygon = rectangle(UNCUT_M, UNCUT_M);
     for plane in planes {
         let height = |p: &Point2<f64>| plane.height(&(shell_from_facet * Point3::new(p.x, p.y, 0.0)));
         let mut kept = Vec::with_capacity(polygon.len() + 1);

@@ -1,5 +1,6 @@
 //! One connected browser: status and previews out, requests in.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -11,8 +12,8 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::request::Request;
 use super::{Console, preview, status};
-use crate::board::Preview;
 use crate::latest::lock;
+use crate::shown::Shown;
 
 /// Numbers the connections.
 static NEXT: AtomicU64 = AtomicU64::new(1);
@@ -35,7 +36,7 @@ impl Drop for Connection<'_> {
         let board = &self.console.board;
         lock(&board.browsers).remove(&self.id);
         if board.viewers.fetch_sub(1, Ordering::Relaxed) == 1 {
-            lock(&board.preview).take();
+            lock(&board.shown).clear();
         }
     }
 }
@@ -47,7 +48,7 @@ pub(super) async fn serve(mut socket: WebSocket, console: Arc<Console>) {
     let mut previews = interval(Duration::from_secs_f64(1.0 / console.config.preview_hz));
     statuses.set_missed_tick_behavior(MissedTickBehavior::Skip);
     previews.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut shown_ns = 0;
+    let mut sent_ns = BTreeMap::new();
     while !console.board.stopping() {
         let sent = tokio::select! {
             received = socket.recv() => match received {
@@ -59,7 +60,7 @@ pub(super) async fn serve(mut socket: WebSocket, console: Arc<Console>) {
                 let text = serde_json::to_string(&status::status(&console)).unwrap_or_default();
                 socket.send(Message::Text(text.into())).await
             }
-            _ = previews.tick() => send_previews(&mut socket, &console, &mut shown_ns).await,
+            _ = previews.tick() => send_previews(&mut socket, &console, &mut sent_ns).await,
         };
         if sent.is_err() {
             break;
@@ -83,15 +84,19 @@ fn obey(connection: &Connection<'_>, text: &str) {
 async fn send_previews(
     socket: &mut WebSocket,
     console: &Arc<Console>,
-    shown_ns: &mut u64,
+    sent_ns: &mut BTreeMap<usize, u64>,
 ) -> Result<(), axum::Error> {
-    let Some(newest) = lock(&console.board.preview).clone() else { return Ok(()) };
-    if newest.update.time_ns <= *shown_ns {
+    let mut newest: Vec<Arc<Shown>> = lock(&console.board.shown).values().cloned().collect();
+    newest.retain(|shown| {
+        let news = sent_ns.get(&shown.seen.camera).is_none_or(|sent_ns| *sent_ns < shown.seen.capture_ns);
+        sent_ns.insert(shown.seen.camera, shown.seen.capture_ns);
+        news
+    });
+    if newest.is_empty() {
         return Ok(());
     }
-    *shown_ns = newest.update.time_ns;
     let encoder = Arc::clone(console);
-    // Decoding and encoding take milliseconds: not on the thread that serves the sockets.
+    // Encoding takes milliseconds: not on the thread that serves the sockets.
     let images = tokio::task::spawn_blocking(move || encode(&encoder, &newest)).await.unwrap_or_default();
     for image in images {
         socket.send(Message::Binary(Bytes::from(image))).await?;
@@ -99,15 +104,9 @@ async fn send_previews(
     Ok(())
 }
 
-fn encode(console: &Console, newest: &Preview) -> Vec<Vec<u8>> {
-    let Some(rig) = &console.rig else { return Vec::new() };
-    let tracking = lock(&console.board.tracking).clone();
-    let names: Vec<String> =
-        tracking.iter().flat_map(|t| t.shells.iter().map(|shell| shell.shell.clone())).collect();
-    let dropped =
-        |camera: usize| tracking.as_ref().and_then(|t| t.cameras.get(camera)).map_or(0, |c| c.dropped);
-    let message = |frame| preview::message(rig, frame, &newest.update, &names, dropped(frame.camera));
-    let images = newest.frames.frames.iter().filter_map(|frame| match message(frame) {
+fn encode(console: &Console, newest: &[Arc<Shown>]) -> Vec<Vec<u8>> {
+    let Some((rig, _)) = &console.view else { return Vec::new() };
+    let images = newest.iter().filter_map(|shown| match preview::message(rig, shown) {
         Ok(image) => image,
         Err(error) => {
             tracing::debug!("no preview: {error}");

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! board ──► status (JSON, 20 Hz) ────────────────► browser: 3D view, tables, curves
+//! rig, shells ──► operator.json (once) ──────────► browser: the cloud of tags, the cameras
 //! board ──► preview (JPEG and overlay, 8 Hz) ────► browser: camera images
 //! board ◄── requests (dead-man and sticks, modes, autopilot, stop) ── browser
 //! ```
@@ -10,6 +11,7 @@
 //! older. What a browser says counts for 150 ms: see [`crate::board::Board::browser`].
 
 mod client;
+mod operator;
 mod preview;
 mod request;
 mod server;
@@ -19,6 +21,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use locoman_vision::rig::Rig;
+use locoman_vision::shells::ShellSet;
 
 use crate::board::Board;
 use crate::config;
@@ -33,8 +36,8 @@ pub struct Console {
     pub board: Arc<Board>,
     /// Stops the robot.
     pub stop: Arc<StopButton>,
-    /// The cameras, to project shells into their images; `None` without a tracker.
-    pub rig: Option<Rig>,
+    /// Cameras and shells, to draw them; `None` without a tracker.
+    pub view: Option<(Rig, ShellSet)>,
     /// Rates.
     pub config: config::Console,
     /// A robot silent for longer is shown as silent.

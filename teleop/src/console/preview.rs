@@ -1,14 +1,17 @@
-//! Camera previews: half-size JPEGs, each with what was found in it, so that drawing and picture belong to
-//! the same instant.
+//! Camera previews: half-size JPEGs, each with what was searched and found in it, so that drawing and picture belong
+//! to the same instant.
 //!
-//! Wire format: length of the head (4 bytes, little endian), the head (JSON), the JPEG.
+//! Wire format: length of the head (4 bytes, little endian), the head (JSON), the JPEG (empty if another machine reads
+//! the camera: its images stay there).
 
 use locoman_vision::camera::Camera;
-use locoman_vision::image::{Frame, ImageError};
+use locoman_vision::image::ImageError;
 use locoman_vision::rig::Rig;
-use locoman_vision::track::{CameraUpdate, TrackUpdate};
+use locoman_vision::track::{MissedTag, SeenTag};
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
+
+use crate::shown::Shown;
 
 /// Enough to see tags by eye.
 const JPEG_QUALITY: i32 = 75;
@@ -21,15 +24,33 @@ struct Head<'a> {
     capture_ns: u64,
     /// Of the full image, in whose pixels everything here is.
     width: u32,
-    dropped: u64,
+    height: u32,
     tags: Vec<Tag>,
+    missed: Vec<Missed>,
+    /// x, y, width, height of what was searched.
+    regions: Vec<[u32; 4]>,
+    whole: bool,
+    problem: Option<&'a str>,
     axes: Vec<Axes<'a>>,
 }
 
 #[derive(Debug, Serialize)]
 struct Tag {
+    id: u32,
     accepted: bool,
     corners: [[f64; 2]; 4],
+    /// Where the shell's pose has its corners.
+    reprojected: Option<[[f64; 2]; 4]>,
+    /// The largest distance of a corner from there.
+    off_px: Option<f64>,
+}
+
+/// A tag that was expected and not read.
+#[derive(Debug, Serialize)]
+struct Missed {
+    id: u32,
+    corners: [[f64; 2]; 4],
+    why: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -40,40 +61,46 @@ struct Axes<'a> {
     ends: [Option<[f64; 2]>; 3],
 }
 
-/// The message for one camera's frame.
-pub(super) fn message(
-    rig: &Rig,
-    frame: &Frame,
-    update: &TrackUpdate,
-    names: &[String],
-    dropped: u64,
-) -> Result<Option<Vec<u8>>, ImageError> {
-    let (Some(camera), Some(seen)) = (rig.cameras.get(frame.camera), update.camera(frame.camera)) else {
-        return Ok(None);
-    };
-    let shells = names.iter().zip(&update.shells);
+/// The message for one camera.
+pub(super) fn message(rig: &Rig, shown: &Shown) -> Result<Option<Vec<u8>>, ImageError> {
+    let Some(camera) = rig.cameras.get(shown.seen.camera) else { return Ok(None) };
     let head = Head {
         camera: &camera.id,
-        capture_ns: frame.capture_ns,
+        capture_ns: shown.seen.capture_ns,
         width: camera.width,
-        dropped,
-        tags: tags(seen),
-        axes: shells
-            .filter_map(|(name, shell)| axes(camera, name, shell.world_from_shell.as_ref()?))
-            .collect(),
+        height: camera.height,
+        tags: shown.seen.tags.iter().map(tag).collect(),
+        missed: shown.seen.missed.iter().map(missed).collect(),
+        regions: shown.seen.searched.iter().map(|rect| [rect.x, rect.y, rect.width, rect.height]).collect(),
+        whole: shown.seen.searched_whole,
+        problem: shown.seen.problem.as_deref(),
+        axes: shown.shells.iter().filter_map(|(name, pose)| axes(camera, name, pose)).collect(),
     };
     let head = serde_json::to_vec(&head).unwrap_or_default();
-    let jpeg = frame.pixels.to_gray_half()?.to_jpeg(JPEG_QUALITY)?;
+    let jpeg = match &shown.image {
+        Some(image) => image.half().to_jpeg(JPEG_QUALITY)?,
+        None => Vec::new(),
+    };
     let length = u32::try_from(head.len()).unwrap_or(0).to_le_bytes();
     Ok(Some([length.as_slice(), &head, &jpeg].concat()))
 }
 
-fn tags(seen: &CameraUpdate) -> Vec<Tag> {
-    let tag = |tag: &locoman_vision::track::SeenTag| Tag {
-        accepted: tag.used,
-        corners: tag.detection.corners_px.map(|corner| [corner.x, corner.y]),
+fn tag(tag: &SeenTag) -> Tag {
+    let corners = &tag.detection.corners_px;
+    let off = |there: &[_; 4]| {
+        corners.iter().zip(there).map(|(seen, there)| nalgebra::distance(seen, there)).fold(0.0, f64::max)
     };
-    seen.tags.iter().map(tag).collect()
+    Tag {
+        id: tag.detection.id,
+        accepted: tag.used,
+        corners: corners.map(Into::into),
+        reprojected: tag.reprojected_px.map(|corners| corners.map(Into::into)),
+        off_px: tag.reprojected_px.as_ref().map(off),
+    }
+}
+
+fn missed(tag: &MissedTag) -> Missed {
+    Missed { id: tag.id, corners: tag.corners_px.map(Into::into), why: tag.refusal.to_string() }
 }
 
 /// `None` if the origin is not in the image.

@@ -14,7 +14,7 @@ use axum::routing::get;
 use rust_embed::RustEmbed;
 use tokio::sync::oneshot;
 
-use super::{Console, client};
+use super::{Console, client, operator};
 
 /// A request is small: hands, modes, stops.
 const MAX_REQUEST_BYTES: usize = 4096;
@@ -56,6 +56,7 @@ pub fn start(listener: TcpListener, console: Console) -> Result<Server> {
         .route("/", get(|| async { page("index.html") }))
         .route("/ws", get(connect))
         .route("/robot.urdf", get(urdf))
+        .route("/operator.json", get(operator))
         .route("/{*path}", get(|Path(path): Path<String>| async move { page(&path) }))
         .with_state(Arc::new(console));
     let (end, ended) = oneshot::channel();
@@ -90,6 +91,10 @@ fn page(path: &str) -> Response {
     };
     ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")], file.data.into_owned())
         .into_response()
+}
+
+async fn operator(State(console): State<Arc<Console>>) -> Response {
+    axum::Json(console.view.as_ref().map(|(rig, shells)| operator::operator(rig, shells))).into_response()
 }
 
 async fn urdf(State(console): State<Arc<Console>>) -> Response {

@@ -1,6 +1,7 @@
 //! The status of everything, as the page reads it: see `console/main.js`.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use locoman_protocol::Received;
 use locoman_protocol::clock::monotonic_ns;
@@ -9,8 +10,12 @@ use serde::Serialize;
 
 use super::Console;
 use super::request::page_name;
+use crate::board::Board;
+use crate::gather::SILENT_NS;
 use crate::latency::Stage;
 use crate::latest::lock;
+use crate::shown::Shown;
+use crate::sight::CameraCounters;
 
 /// A tracking report older than this is no news.
 const FRESH_NS: u64 = 500_000_000;
@@ -22,6 +27,7 @@ pub(super) struct Status {
     robot: Option<Robot>,
     pilot: Pilot,
     tracking: TrackingStatus,
+    cameras: Vec<CameraStatus>,
     latency: Vec<StageStatus>,
     events: Vec<EventStatus>,
 }
@@ -87,6 +93,35 @@ struct ShellStatus {
     cameras: u32,
 }
 
+/// What one camera has seen of a shell: numbers of its tags, those that the pose rests on first.
+#[derive(Debug, Serialize)]
+struct SeenStatus {
+    accepted: Vec<u32>,
+    refused: Vec<u32>,
+}
+
+#[derive(Debug, Serialize)]
+struct CameraStatus {
+    name: String,
+    /// Since the last frame; `None` before the first.
+    age_ms: Option<f64>,
+    silent: bool,
+    frames: u64,
+    dropped: u64,
+    searched_whole: u64,
+    read_ms: f64,
+    clock: Option<ClockStatus>,
+    problem: String,
+    seen: SeenStatus,
+}
+
+#[derive(Debug, Serialize)]
+struct ClockStatus {
+    offset_ms: f64,
+    error_ms: f64,
+    drift_ppm: f64,
+}
+
 #[derive(Debug, Serialize)]
 struct StageStatus {
     name: &'static str,
@@ -121,6 +156,7 @@ pub(super) fn status(console: &Console) -> Status {
             auto: pilot.auto,
         },
         tracking: tracking_status(tracking.as_ref(), now_ns, board.tracking_rate_hz(now_ns)),
+        cameras: cameras(board, now_ns),
         latency: latency
             .map(|(stage, percentiles)| StageStatus {
                 name: stage.name(),
@@ -180,6 +216,42 @@ fn tracking_status(tracking: Option<&Arc<Tracking>>, now_ns: u64, rate_hz: f64) 
         dropped: tracking.cameras.iter().map(|camera| camera.dropped).sum(),
         shells: tracking.shells.iter().map(shell_status).collect(),
     }
+}
+
+fn cameras(board: &Board, now_ns: u64) -> Vec<CameraStatus> {
+    let Some(counters) = board.counters.get() else { return Vec::new() };
+    let shown = lock(&board.shown).clone();
+    let cameras = counters.ids().iter().zip(&counters.cameras).enumerate();
+    let status = |(index, (id, counters)): (usize, (&String, &CameraCounters))| {
+        let count = |which: &AtomicU64| which.load(Ordering::Relaxed);
+        let heard_ns = Some(count(&counters.heard_ns)).filter(|heard_ns| *heard_ns > 0);
+        let age_ns = heard_ns.map(|heard_ns| now_ns.saturating_sub(heard_ns));
+        CameraStatus {
+            name: id.clone(),
+            age_ms: age_ns.map(ms),
+            silent: age_ns.is_none_or(|age_ns| age_ns > SILENT_NS),
+            frames: count(&counters.frames),
+            dropped: count(&counters.dropped),
+            searched_whole: count(&counters.searched_whole),
+            read_ms: ms(count(&counters.read_ns)),
+            clock: counters.clock().map(|clock| ClockStatus {
+                offset_ms: clock.offset_ns as f64 * 1e-6,
+                error_ms: ms(clock.error_ns),
+                drift_ppm: clock.drift_ppm,
+            }),
+            problem: counters.problem(),
+            seen: seen(shown.get(&index).map(Arc::as_ref)),
+        }
+    };
+    cameras.map(status).collect()
+}
+
+fn seen(shown: Option<&Shown>) -> SeenStatus {
+    let tags = |used: bool| {
+        let tags = shown.iter().flat_map(|shown| &shown.seen.tags);
+        tags.filter(|tag| tag.used == used).map(|tag| tag.detection.id).collect()
+    };
+    SeenStatus { accepted: tags(true), refused: tags(false) }
 }
 
 fn shell_status(shell: &ShellPose) -> ShellStatus {

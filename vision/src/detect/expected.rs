@@ -24,7 +24,7 @@ use nalgebra::{Matrix2, Matrix3, Point2, SMatrix, Vector2, Vector3};
 use super::CornerCovariance;
 use crate::camera::Camera;
 use crate::image::GrayImage;
-use fit::{Appearance, Effort, Fit, Samples};
+use fit::{Appearance, Fit, Samples};
 use pattern::{CORNERS, MIDDLE, Pattern};
 use rays::RayGrid;
 
@@ -87,8 +87,6 @@ const LEAST_CONTRAST: f64 = 16.0;
 const MOST_RESIDUAL: f64 = 0.15;
 /// How far the fit may move the aligned tag, in cells: the rest is another tag or none.
 const FARTHEST_CELLS: f64 = 1.0;
-/// Rows of pixels that are sampled on a tag of this size or larger.
-const ROWS: f64 = 25.0;
 /// Half-width of the blur to begin with, pixels: a lens of σ = 0.7 px and the pixel itself, σ = 0.29 px.
 const START_BLUR_PX: f64 = 2.27;
 /// The kernel's half-width in standard deviations.
@@ -101,7 +99,6 @@ pub struct Reader {
     rays: RayGrid,
     patterns: BTreeMap<u32, Pattern>,
     samples: Samples,
-    row: Vec<[f32; 2]>,
 }
 
 impl Expectation {
@@ -156,7 +153,6 @@ impl Reader {
             camera: camera.clone(),
             patterns: ids.iter().filter_map(|id| Some((*id, Pattern::new(*id)?))).collect(),
             samples: Samples::default(),
-            row: Vec::new(),
         }
     }
 
@@ -174,11 +170,8 @@ impl Reader {
             blur_cells,
             correlation: view.correlation,
         };
-        let step = ((view.side_px / ROWS) as usize).max(1);
-        sample::collect(image, pattern, &view, &self.rays, &start, step, &mut self.row, &mut self.samples);
-        // A thousandth of a pixel on a tag of forty.
-        let effort = Effort { max_steps: 5, settled_cells: 2e-4 };
-        let fit = self.samples.fit(pattern, &start, effort).ok_or(Refusal::Misfit)?;
+        sample::collect(image, pattern, &view, &self.rays, &start, &mut self.samples);
+        let fit = self.samples.fit(&start).ok_or(Refusal::Misfit)?;
         self.judge(image, pattern, &view, &fit)
     }
 
@@ -202,8 +195,7 @@ impl Reader {
         if moved_px * view.cells_per_px[0].max(view.cells_per_px[1]) > FARTHEST_CELLS {
             return Err(Refusal::Misfit);
         }
-        let threshold = appearance.black + 0.5 * appearance.contrast;
-        let wrong_cells = align::wrong_cells(image, pattern, &fitted, threshold);
+        let wrong_cells = align::wrong_cells(image, pattern, &fitted);
         if wrong_cells > align::MOST_WRONG_CELLS {
             return Err(Refusal::Cells);
         }

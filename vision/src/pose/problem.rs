@@ -2,8 +2,8 @@
 //!
 //! Each tag counts with ρ(s) of its squared whitened residual s: ρ = s up to k, then k (1 + ln(s/k)), so that
 //! what is ordinary counts in full and keeps the covariance true, and what is not fades like Cauchy's kernel.
-//! k grows with the lower median of s: while the start is far off, nothing fades; where sigma promises too
-//! much, everything is allowed more.
+//! k grows with the lower median of s: while the start is far off, nothing fades. From the minimum that this leads
+//! to, it is bounded: then half of the tags may be false.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,6 +11,9 @@ use super::state::{Matrix18, Prior, State, Vector18};
 use super::term::{BEHIND, Linear, RESIDUAL, Term, View};
 use super::{Fate, Observation, SolverSettings, Views};
 
+/// Once a minimum is found, noise larger than promised is allowed for only up to this variance: what lies beyond is
+/// false, even if half of the tags are.
+const MOST_SCALE2: f64 = 4.0;
 /// Median of χ² with eight degrees of freedom.
 const MEDIAN: f64 = 7.344;
 
@@ -117,7 +120,8 @@ impl Workspace {
         let mut state = *start;
         let mut damping = 0.0;
         Self::linearize(&self.terms, &self.eyes, views, &state, &mut self.here);
-        let mut limit = self.kernel_limit(settings)?;
+        let mut most = f64::INFINITY;
+        let mut limit = self.kernel_limit(settings, most)?;
         let mut normal = self.normal(&state, limit);
         for _ in 0..settings.max_steps {
             let (prior_hessian, prior_gradient) = prior.linearized(&state);
@@ -136,7 +140,13 @@ impl Workspace {
             };
             let step = -cholesky.solve(&gradient);
             if -step.dot(&gradient) < CONVERGED {
-                break;
+                let bounded = self.kernel_limit(settings, MOST_SCALE2)?;
+                if bounded >= limit {
+                    break;
+                }
+                (most, limit) = (MOST_SCALE2, bounded);
+                normal = self.normal(&state, limit);
+                continue;
             }
             let moved = state.moved(&step);
             Self::linearize(&self.terms, &self.eyes, views, &moved, &mut self.trial);
@@ -146,7 +156,7 @@ impl Workspace {
                 state = moved;
                 std::mem::swap(&mut self.here, &mut self.trial);
                 damping = if damping > FIRST { damping * DOWN } else { 0.0 };
-                limit = self.kernel_limit(settings)?;
+                limit = self.kernel_limit(settings, most)?;
                 normal = self.normal(&state, limit);
             } else {
                 damping = f64::max(damping * UP, FIRST);
@@ -174,8 +184,8 @@ impl Workspace {
     }
 
     /// Where the kernel begins to fade: grows with the lower median of what counts; `None` if nothing does.
-    fn kernel_limit(&mut self, settings: &SolverSettings) -> Option<f64> {
-        Some(settings.kernel_chi2 * self.scale2()?)
+    fn kernel_limit(&mut self, settings: &SolverSettings, most: f64) -> Option<f64> {
+        Some(settings.kernel_chi2 * self.scale2()?.min(most))
     }
 
     /// The variance that the data show, in units of the promised one: from the lower median, at least 1.
@@ -260,7 +270,7 @@ impl Workspace {
         /// With fewer tags the median says nothing of the noise: one of them may be false.
         const ENOUGH: usize = 3;
         let scale2 = if self.used_count() < ENOUGH { 1.0 } else { self.scale2().unwrap_or(1.0) };
-        let limit = settings.outlier_chi2 * scale2;
+        let limit = settings.outlier_chi2 * scale2.min(MOST_SCALE2);
         let mut changed = false;
         for k in 0..self.terms.len() {
             let (Some(_), Linear { squared, squared_px2, faces, .. }) = (&self.terms[k], &self.here[k])

@@ -35,8 +35,16 @@ struct Input {
 impl VideoSource {
     /// Opens what the rig file names for each camera.
     pub fn open(rig: &Rig) -> Result<Self, SourceError> {
+        Self::open_some(rig, |_| true)
+    }
+
+    /// Opens what the rig file names for some cameras, by their index.
+    pub fn open_some(rig: &Rig, wanted: impl Fn(usize) -> bool) -> Result<Self, SourceError> {
         let mut inputs: Vec<Input> = Vec::new();
         for (index, (camera, source)) in rig.cameras.iter().zip(&rig.sources).enumerate() {
+            if !wanted(index) {
+                continue;
+            }
             let (name, live) = place(source).ok_or_else(|| SourceError::MissingCamera {
                 path: "rig file".into(),
                 camera: camera.id.clone(),

@@ -67,7 +67,7 @@ impl Eye {
         let begun = Instant::now();
         self.images += 1;
         let my_turn = self.images.is_multiple_of(self.cameras);
-        let motions = motions.at(capture_ns, &self.settings);
+        let motions = motions.expected_at(capture_ns, &self.settings);
         let mut update = CameraUpdate::nothing(self.index, capture_ns);
         let mut sought: Option<Region> = None;
         for (shell, motion) in motions.iter().enumerate() {

@@ -70,8 +70,9 @@ pub struct Motion {
     /// Angular acceleration, shell axes, rad/s².
     pub angular_rad_s2: Vector3<f64>,
     /// What the data made of the variances of both accelerations, as a factor.
-    variance: [f64; 2],
-    covariance: Matrix18,
+    pub variance: [f64; 2],
+    /// Covariance of position, rotation, velocity, angular velocity, acceleration, angular acceleration.
+    pub covariance: Matrix18,
 }
 
 /// What a solve says of a state at one instant, apart from what was believed before: a normal

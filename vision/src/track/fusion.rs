@@ -98,6 +98,26 @@ impl Fusion {
         self.trackers.iter().map(|tracker| tracker.at(time_ns, None, &self.settings)).collect()
     }
 
+    /// Takes in what a search of a whole image has found of shells that are lost, however late it comes: it begins
+    /// their motion at the time of that image. What it saw of others is left aside: newer frames follow them. Whether
+    /// there was anything.
+    pub fn found(&mut self, mut search: CameraUpdate) -> bool {
+        let known = self.motions().known_at(search.capture_ns);
+        search.tags.retain(|seen| known.get(seen.shell) == Some(&false));
+        if search.tags.is_empty() {
+            return false;
+        }
+        // Not judged by its time: a search takes long, and its image was already taken in by an eye.
+        let mut search = [search];
+        for index in 0..self.order.len() {
+            let shell = self.order[index];
+            if !known[shell] {
+                self.update_shell(shell, self.shells.palm_of(shell), &mut search);
+            }
+        }
+        true
+    }
+
     /// Takes in what cameras saw, each at its own time; frames that are late by up to 50 ms included.
     pub fn update(&mut self, mut cameras: Vec<CameraUpdate>) -> TrackUpdate {
         let begun = Instant::now();

@@ -122,3 +122,21 @@ fn frames_that_cannot_be_used_are_named_and_the_rest_goes_on() {
     assert_eq!(update.camera(2).expect("a frame").problem, None);
     assert_eq!(update.shells[0].verdict, Verdict::Tracked);
 }
+
+#[test]
+fn a_search_of_a_whole_image_begins_what_is_lost_and_leaves_what_is_followed() {
+    let (rig, shells, settings) = (testing::rig(), testing::shells(), TrackerSettings::default());
+    let image = testing::render(&rig.cameras[0], &shells, &testing::worn());
+    let time_ns = 1_000_000_000;
+    let mut scout = Scout::new(&rig, 0, &shells, &settings).expect("scout");
+    let found = scout.search(&image, time_ns);
+    let mut sut = Fusion::new(rig, shells, settings);
+    assert!(sut.found(found.clone()));
+    let begun = sut.motions();
+    assert!(begun.known_at(time_ns).contains(&true));
+    // The same again, late: what is known by now stays as it is.
+    sut.found(CameraUpdate { capture_ns: time_ns + 30_000_000, ..found });
+    for (before, after) in begun.latest().iter().zip(sut.motions().latest()) {
+        assert!(before.is_none() || before == after);
+    }
+}

@@ -189,9 +189,10 @@ pub(super) fn mean_time_ns<'a>(cameras: impl Iterator<Item = &'a CameraUpdate> +
 
 /// Shell and tag index of each id.
 #[derive(Debug)]
-pub(super) struct TagOwners(HashMap<u32, (usize, usize)>);
+pub struct TagOwners(HashMap<u32, (usize, usize)>);
 
 impl TagOwners {
+    /// Of all tags of all shells.
     pub fn new(shells: &ShellSet) -> Self {
         let tags = shells.shells.iter().enumerate();
         let tags =
@@ -199,11 +200,12 @@ impl TagOwners {
         Self(tags.collect())
     }
 
+    /// The ids, in no order.
     pub fn ids(&self) -> Vec<u32> {
         self.0.keys().copied().collect()
     }
 
-    /// Names the shell of each detection.
+    /// Names the shell of each detection; those that are on none are left out.
     pub fn assign(&self, found: Vec<Detection>) -> Vec<SeenTag> {
         let seen = |detection: Detection| {
             let &(shell, tag) = self.0.get(&detection.id)?;

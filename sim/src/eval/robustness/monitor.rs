@@ -84,6 +84,23 @@ impl Findings {
         self.ground_contacts += other.ground_contacts;
     }
 
+    /// Which joints broke which limits, in words; nothing if none did.
+    pub fn broken(&self) -> Option<String> {
+        let Self { position_over_rad, speed_share, torque_share, .. } = self;
+        let beyond = |what: &str, peak: &Peak| {
+            (peak.value > 1.0)
+                .then(|| format!("{} at {:.1}% of its {what}", peak.place(), 100.0 * peak.value))
+        };
+        let range = (position_over_rad.value > 0.0).then(|| {
+            format!("{} {:.4} rad beyond its range", position_over_rad.place(), position_over_rad.value)
+        });
+        let broken: Vec<String> = [range, beyond("speed", speed_share), beyond("torque", torque_share)]
+            .into_iter()
+            .flatten()
+            .collect();
+        (!broken.is_empty()).then(|| broken.join(", "))
+    }
+
     /// The robot is no longer where a trial can go on.
     pub fn is_over(&self) -> bool {
         self.falls + self.interventions > 0

@@ -57,15 +57,8 @@ fn findings(table: &mut String, findings: &Findings) {
 
 /// Which joints broke a limit, on a line of its own.
 fn places(table: &mut String, findings: &Findings) {
-    let Findings { position_over_rad, speed_share, torque_share, .. } = findings;
-    let broken: Vec<String> =
-        [("range", position_over_rad, 0.0), ("speed", speed_share, 1.0), ("torque", torque_share, 1.0)]
-            .into_iter()
-            .filter(|(_, peak, limit)| peak.value > *limit)
-            .map(|(what, peak, _)| format!("{what}: {}", peak.place()))
-            .collect();
-    if !broken.is_empty() {
-        let _ = writeln!(table, "{:12} beyond {}", "", broken.join(", "));
+    if let Some(broken) = findings.broken() {
+        let _ = writeln!(table, "{:12} {broken}", "");
     }
 }
 

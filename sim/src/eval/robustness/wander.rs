@@ -98,6 +98,9 @@ fn play(sut: &mut Lockstep, model: &Model, side: Side, kind: Kind, seed: u64) ->
     if let Some(end) = &monitor.end {
         tracing::warn!("trajectory {seed}, {}: {end}", kind.name());
     }
+    if let Some(broken) = monitor.findings.broken() {
+        tracing::warn!("trajectory {seed}, {}: {broken}", kind.name());
+    }
     if !monitor.touched.is_empty() {
         tracing::warn!("trajectory {seed}, {}: touched {:?}", kind.name(), monitor.touched);
     }

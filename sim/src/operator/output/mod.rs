@@ -17,10 +17,10 @@ pub use folder::Folder;
 pub use recording::Recording;
 pub use truth::TruthFile;
 
-/// The pictures of all cameras at one instant, encoded as the outputs need them.
+/// The pictures of all cameras that take one at an instant, encoded as the outputs need them.
 #[derive(Debug)]
 pub struct Instant<'a> {
-    /// Middle of the exposure.
+    /// Middle of the exposure of the middle row.
     pub capture_ns: u64,
     /// Counts from 0.
     pub number: u64,
@@ -28,7 +28,7 @@ pub struct Instant<'a> {
     pub posture: Posture,
     /// The shells that are in the scene.
     pub bodies: &'a [Body],
-    /// One for each camera of the rig.
+    /// One for each of these cameras.
     pub images: Vec<Image<'a>>,
 }
 

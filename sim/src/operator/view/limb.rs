@@ -3,7 +3,7 @@
 use locoman_vision::camera::Camera;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::{Bounds, Hit, LIMB, Lamp};
+use super::{Bounds, Hit, LIMB, Lamp, Window};
 use crate::operator::body::{Limb, Shape};
 use crate::operator::lens::Ray;
 
@@ -16,6 +16,7 @@ pub(super) struct SeenLimb {
     albedo: f32,
     stripes: f32,
     pub(super) bounds: Option<Bounds>,
+    pub(super) window: Window,
 }
 
 #[derive(Debug)]
@@ -35,11 +36,12 @@ enum Form {
 
 impl SeenLimb {
     pub(super) fn new(camera: &Camera, limb: &Limb, camera_from_world: &Isometry3<f64>) -> Self {
-        let (form, bounds) = match limb.shape {
+        let (form, bounds, window) = match limb.shape {
             Shape::Capsule { a, b, radius_m } => {
                 let (a, b) = (camera_from_world * a, camera_from_world * b);
                 let form = Form::Capsule { a: a.coords.cast(), ab: (b - a).cast(), radius: radius_m as f32 };
-                (form, Bounds::of(camera, [a, b].into_iter(), radius_m))
+                let ends = [a, b].into_iter();
+                (form, Bounds::of(camera, ends.clone(), radius_m), Window::of_balls(ends, radius_m))
             }
             Shape::Ellipsoid { pose, radii_m } => {
                 let pose = camera_from_world * pose;
@@ -51,10 +53,11 @@ impl SeenLimb {
                     origin: (-unit_from_camera * center).cast(),
                     tallness: radii_m.z as f32,
                 };
-                (form, Bounds::of(camera, [Point3::from(center)].into_iter(), radii_m.max()))
+                let (center, reach_m) = (std::iter::once(Point3::from(center)), radii_m.max());
+                (form, Bounds::of(camera, center.clone(), reach_m), Window::of_balls(center, reach_m))
             }
         };
-        Self { form, albedo: limb.albedo, stripes: limb.stripes, bounds }
+        Self { form, albedo: limb.albedo, stripes: limb.stripes, bounds, window }
     }
 
     #[inline]

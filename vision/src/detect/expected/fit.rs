@@ -18,9 +18,12 @@
 //! The covariance of G is the inverse of the normal matrix times the variance of the residuals (Triggs et al.,
 //! "Bundle adjustment: a modern synthesis", 1999, section 2).
 
+mod lanes;
+
 use nalgebra::{SMatrix, SVector};
 
-use super::pattern::{FRAMED, Pattern};
+use super::pattern::Pattern;
+use lanes::{Derivatives, KERNEL_VARIANCE, LANES, Picture, Pixels};
 
 /// Unknowns: eight of G, then β, γ, h_u, h_v.
 const UNKNOWNS: usize = 12;
@@ -46,15 +49,20 @@ pub struct Appearance {
 /// Pixels of a tag near its edges.
 #[derive(Debug, Default)]
 pub struct Samples {
-    /// Ideal image points in local coordinates.
-    pub x: Vec<f32>,
-    /// See [`Samples::x`].
-    pub y: Vec<f32>,
-    /// Grey levels.
-    pub grey: Vec<f32>,
-    /// Derivatives by the unknowns, one column each.
-    columns: [Vec<f32>; UNKNOWNS],
-    residuals: Vec<f32>,
+    /// The first `count` are pixels; what follows is room.
+    pixels: Vec<Pixel>,
+    count: usize,
+    lanes: Vec<Pixels>,
+    derivatives: Vec<Derivatives>,
+}
+
+/// One pixel: where it is in local coordinates, and the cell that it probably lies in. The fit may move it out of
+/// that cell by a fraction of its side.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pixel {
+    place: [f32; 2],
+    cell: [u8; 2],
+    grey: u8,
 }
 
 /// A fitted appearance.
@@ -68,18 +76,12 @@ pub struct Fit {
     pub covariance: SMatrix<f64, 8, 8>,
 }
 
-/// How the fit goes about it.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort {
-    /// Steps at most.
-    pub max_steps: usize,
-    /// Ends when no corner moves farther, cells.
-    pub settled_cells: f64,
-}
-
-/// Variance of the kernel of half-width 1, and its height.
-const KERNEL_VARIANCE: f64 = 1.0 / 9.0;
-const PEAK: f32 = 35.0 / 32.0;
+/// Steps at most: two or three are usual.
+const MAX_STEPS: usize = 7;
+/// A step that moves no edge farther than this (cells) leaves an error of its square: a thousandth of a pixel.
+const SETTLED_CELLS: f64 = 0.02;
+/// The first steps take a part of the pixels.
+const COARSE_STRIDE: usize = 3;
 /// Blur beyond one cell is not a tag any more.
 const BLUR_RANGE: [f64; 2] = [0.05, 1.0];
 /// How far the blur departs from what it was, as a share: it is known from other tags and images.
@@ -90,107 +92,115 @@ const LEAST_NOISE: f64 = 0.3;
 impl Samples {
     /// Forgets all pixels.
     pub fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.grey.clear();
+        self.count = 0;
     }
 
-    /// Adds a pixel.
+    /// Adds a pixel, if it is to be kept.
     #[inline]
-    pub fn push(&mut self, x: f32, y: f32, grey: u8) {
-        self.x.push(x);
-        self.y.push(y);
-        self.grey.push(f32::from(grey));
+    pub fn push(&mut self, place: [f32; 2], cell: [usize; 2], grey: u8, keep: bool) {
+        if self.count == self.pixels.len() {
+            self.pixels.resize(2 * self.count + 64, Pixel::default());
+        }
+        self.pixels[self.count] = Pixel { place, cell: cell.map(|index| index as u8), grey };
+        self.count += usize::from(keep);
+    }
+
+    /// Gets ready for the fit, after the last pixel.
+    pub fn complete(&mut self, pattern: &Pattern) {
+        self.lanes.clear();
+        for pixels in self.pixels[..self.count].chunks(LANES) {
+            let mut lanes = Pixels::default();
+            for (lane, pixel) in pixels.iter().enumerate() {
+                let [column, row] = pixel.cell;
+                lanes.x[lane] = pixel.place[0];
+                lanes.y[lane] = pixel.place[1];
+                lanes.column[lane] = f32::from(column);
+                lanes.row[lane] = f32::from(row);
+                lanes.grey[lane] = f32::from(pixel.grey);
+                lanes.weight[lane] = 1.0;
+                let cells = pattern.around(usize::from(column), usize::from(row));
+                for (all, cell) in lanes.cells.iter_mut().zip(cells) {
+                    all[lane] = cell;
+                }
+            }
+            self.lanes.push(lanes);
+        }
     }
 
     /// Number of pixels.
     pub fn len(&self) -> usize {
-        self.grey.len()
+        self.count
     }
 
     /// Fits from a start that is right within half the reach of the blur; `None` where it leads nowhere.
-    pub fn fit(&mut self, pattern: &Pattern, start: &Appearance, effort: Effort) -> Option<Fit> {
+    pub fn fit(&mut self, start: &Appearance) -> Option<Fit> {
         if self.len() < 4 * UNKNOWNS {
             return None;
         }
         let mut appearance = *start;
         let mut noise = f64::INFINITY;
         let mut normal = Normal::zeros();
-        for step in 0..effort.max_steps {
-            let squares = self.linearize(pattern, &appearance);
-            noise = (squares / (self.len() - UNKNOWNS) as f64).sqrt().max(LEAST_NOISE);
+        let mut stride = COARSE_STRIDE;
+        for _ in 0..MAX_STEPS {
+            let products = self.linearize(&appearance, stride);
+            let squares = f64::from(products[UNKNOWNS][UNKNOWNS]);
+            let freedom = (self.len() as f64 / stride as f64 - UNKNOWNS as f64).max(1.0);
+            noise = (squares / freedom).sqrt().max(LEAST_NOISE);
             let gradient;
-            (normal, gradient) = self.normal(noise, &appearance, start);
+            (normal, gradient) = normal_equations(&products, noise, &appearance, start);
             let change = normal.cholesky()?.solve(&gradient);
-            let moved = appearance.change(&change)?;
-            appearance = moved;
-            let last = step + 1 == effort.max_steps;
-            if last || change_cells(&change) < effort.settled_cells {
+            appearance = appearance.changed(&change)?;
+            let settled = change_cells(&change) < SETTLED_CELLS;
+            if settled && stride == 1 {
                 break;
             }
+            if settled {
+                stride = 1;
+            }
+        }
+        if stride > 1 {
+            return None;
         }
         let covariance = normal.cholesky()?.inverse().fixed_view::<8, 8>(0, 0).into_owned();
         Some(Fit { appearance, noise, covariance })
     }
 
-    /// Residuals and derivatives at an appearance; the sum of squared residuals.
-    fn linearize(&mut self, pattern: &Pattern, appearance: &Appearance) -> f64 {
-        let count = self.len();
-        for column in &mut self.columns {
-            column.resize(count, 0.0);
-        }
-        self.residuals.resize(count, 0.0);
-        let g = appearance.cells_from_local.map(|value| value as f32);
-        let (black, contrast) = (appearance.black as f32, appearance.contrast as f32);
-        let inv_blur = appearance.blur_cells.map(|h| 1.0 / h as f32);
+    /// Products of derivatives and residuals at an appearance, summed over every `stride`-th eight of pixels.
+    fn linearize(&mut self, appearance: &Appearance, stride: usize) -> lanes::Products {
         let [h_u, h_v] = appearance.blur_cells;
-        let mixed = (appearance.correlation * h_u * h_v * KERNEL_VARIANCE) as f32;
-        let mut squares = 0.0;
-        for k in 0..count {
-            let (x, y) = (self.x[k], self.y[k]);
-            let inv_w = 1.0 / (g[6] * x + g[7] * y + g[8]);
-            let u = (g[0] * x + g[1] * y + g[2]) * inv_w;
-            let v = (g[3] * x + g[4] * y + g[5]) * inv_w;
-            let [t, t_u, t_v, t_hu, t_hv] = shade(pattern, u, v, inv_blur, mixed);
-            let (a, b) = (contrast * t_u * inv_w, contrast * t_v * inv_w);
-            let c = -(a * u + b * v);
-            let row =
-                [a * x, a * y, a, b * x, b * y, b, c * x, c * y, 1.0, t, contrast * t_hu, contrast * t_hv];
-            for (column, value) in self.columns.iter_mut().zip(row) {
-                column[k] = value;
-            }
-            let residual = self.grey[k] - black - contrast * t;
-            self.residuals[k] = residual;
-            squares += f64::from(residual * residual);
-        }
-        squares
+        let picture = Picture {
+            cells_from_local: appearance.cells_from_local.map(|value| value as f32),
+            black: appearance.black as f32,
+            contrast: appearance.contrast as f32,
+            inv_blur: [1.0 / h_u as f32, 1.0 / h_v as f32],
+            mixed: (appearance.correlation * h_u * h_v * KERNEL_VARIANCE) as f32,
+        };
+        lanes::products(&self.lanes, stride, &picture, &mut self.derivatives)
     }
+}
 
-    /// The normal equations in units of the noise, with what is known of the blur.
-    fn normal(&self, noise: f64, now: &Appearance, known: &Appearance) -> (Normal, Unknowns) {
-        let weight = 1.0 / (noise * noise);
-        let mut normal = Normal::zeros();
-        let mut gradient = Unknowns::zeros();
-        for i in 0..UNKNOWNS {
-            for j in 0..=i {
-                let value = weight * f64::from(dot(&self.columns[i], &self.columns[j]));
-                normal[(i, j)] = value;
-                normal[(j, i)] = value;
-            }
-            gradient[i] = weight * f64::from(dot(&self.columns[i], &self.residuals));
-        }
-        for axis in 0..2 {
-            let prior = 1.0 / (BLUR_SHARE * known.blur_cells[axis]).powi(2);
-            normal[(10 + axis, 10 + axis)] += prior;
-            gradient[10 + axis] += prior * (known.blur_cells[axis] - now.blur_cells[axis]);
-        }
-        (normal, gradient)
+/// The normal equations in units of the noise, with what is known of the blur.
+fn normal_equations(
+    products: &lanes::Products,
+    noise: f64,
+    now: &Appearance,
+    known: &Appearance,
+) -> (Normal, Unknowns) {
+    let weight = 1.0 / (noise * noise);
+    let mut normal = Normal::from_fn(|i, j| weight * f64::from(products[i][j]));
+    let mut gradient = Unknowns::from_fn(|i, _| weight * f64::from(products[UNKNOWNS][i]));
+    for axis in 0..2 {
+        let at = UNKNOWNS - 2 + axis;
+        let prior = 1.0 / (BLUR_SHARE * known.blur_cells[axis]).powi(2);
+        normal[(at, at)] += prior;
+        gradient[at] += prior * (known.blur_cells[axis] - now.blur_cells[axis]);
     }
+    (normal, gradient)
 }
 
 impl Appearance {
     /// With all unknowns changed; `None` if it is no picture of a tag any more.
-    fn change(&self, change: &Unknowns) -> Option<Self> {
+    fn changed(&self, change: &Unknowns) -> Option<Self> {
         if !change.iter().all(|number| number.is_finite()) {
             return None;
         }
@@ -220,110 +230,4 @@ fn change_cells(change: &Unknowns) -> f64 {
     const FAR: f64 = 9.0;
     let axis = |first: usize| change.fixed_rows::<3>(first).abs().sum();
     axis(0).max(axis(3)) + FAR * change.fixed_rows::<2>(6).abs().sum()
-}
-
-/// T and its derivatives by u, v, h_u, h_v.
-#[inline]
-fn shade(pattern: &Pattern, u: f32, v: f32, inv_blur: [f32; 2], mixed: f32) -> [f32; 5] {
-    let (i, j) = (u.floor(), v.floor());
-    let last = FRAMED as f32 - 3.0;
-    let (i, j) = (i.clamp(0.0, last), j.clamp(0.0, last));
-    let across = Weights::new(u - i, inv_blur[0]);
-    let down = Weights::new(v - j, inv_blur[1]);
-    let cells = pattern.around(Pattern::place(i as usize, j as usize));
-    let along = |w: [f32; 3], c: [f32; 3]| w[0] * c[0] + w[1] * c[1] + w[2] * c[2];
-    let rows = cells.map(|row| along(across.of, row));
-    let rows_u = cells.map(|row| along(across.by_place, row));
-    let rows_h = cells.map(|row| along(across.by_blur, row));
-    [
-        along(down.of, rows) + mixed * along(down.by_place, rows_u),
-        along(down.of, rows_u),
-        along(down.by_place, rows),
-        along(down.of, rows_h),
-        along(down.by_blur, rows),
-    ]
-}
-
-/// What a cell and its two neighbours contribute at a place in the cell.
-struct Weights {
-    of: [f32; 3],
-    by_place: [f32; 3],
-    by_blur: [f32; 3],
-}
-
-impl Weights {
-    /// `place` from 0 to 1 across the cell.
-    #[inline]
-    fn new(place: f32, inv_blur: f32) -> Self {
-        let (before, slope_before) = beyond(place * inv_blur);
-        let (after, slope_after) = beyond((1.0 - place) * inv_blur);
-        // d(d/h)/dh = −(d/h)/h, and the share beyond falls with d/h.
-        let by_blur_before = slope_before * place * inv_blur * inv_blur;
-        let by_blur_after = slope_after * (1.0 - place) * inv_blur * inv_blur;
-        let (slope_before, slope_after) = (slope_before * inv_blur, slope_after * inv_blur);
-        Self {
-            of: [before, 1.0 - before - after, after],
-            by_place: [-slope_before, slope_before - slope_after, slope_after],
-            by_blur: [by_blur_before, -by_blur_before - by_blur_after, by_blur_after],
-        }
-    }
-}
-
-/// The share of the kernel that lies beyond an edge at a distance of τ half-widths, and the kernel there.
-#[inline]
-fn beyond(tau: f32) -> (f32, f32) {
-    let tau = tau.clamp(-1.0, 1.0);
-    let t2 = tau * tau;
-    let rest = 1.0 - t2;
-    let share = tau * (1.0 - t2 * (1.0 - t2 * (0.6 - t2 / 7.0)));
-    (0.5 - PEAK * share, PEAK * rest * rest * rest)
-}
-
-/// Dot product in eight lanes, so that the compiler uses vectors.
-#[inline]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    const LANES: usize = 8;
-    let mut sums = [0.0f32; LANES];
-    let (a_parts, b_parts) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f32 = a_parts.remainder().iter().zip(b_parts.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a_parts.zip(b_parts) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    rest + sums.iter().sum::<f32>()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Derivatives that a step of a thousandth of a cell cannot tell from differences.
-    const TOLERANCE: f32 = 5e-3;
-
-    #[test]
-    fn derivatives_of_the_picture_are_those_of_differences() {
-        let pattern = Pattern::new(7).expect("a tag");
-        let step = 1e-3;
-        for blur in [[0.3f32, 0.45], [0.9, 0.2]] {
-            let at = |u: f32, v: f32, h: [f32; 2]| shade(&pattern, u, v, h.map(|h| 1.0 / h), 0.0)[0];
-            for k in 0..400 {
-                let (u, v) = (0.3 + 0.47 * (k % 20) as f32, 0.4 + 0.46 * (k / 20) as f32);
-                let found = shade(&pattern, u, v, blur.map(|h| 1.0 / h), 0.0);
-                let [hu, hv] = blur;
-                let differences = [
-                    at(u + step, v, blur) - at(u - step, v, blur),
-                    at(u, v + step, blur) - at(u, v - step, blur),
-                    at(u, v, [hu + step, hv]) - at(u, v, [hu - step, hv]),
-                    at(u, v, [hu, hv + step]) - at(u, v, [hu, hv - step]),
-                ];
-                for (found, difference) in found[1..].iter().zip(differences) {
-                    assert!(
-                        (found - difference / (2.0 * step)).abs() < TOLERANCE,
-                        "{k}: {found} {difference}"
-                    );
-                }
-            }
-        }
-    }
 }

@@ -48,21 +48,23 @@ impl Pattern {
 
     /// The place of a cell in the tables, given the integer parts of u and v inside the margin.
     #[inline]
-    pub fn place(column: usize, row: usize) -> usize {
+    fn place(column: usize, row: usize) -> usize {
         (row + 1) * FRAMED + column + 1
     }
 
-    /// A cell and its eight neighbours: rows from above, each from the left.
+    /// A cell and its eight neighbours, row by row from the top left.
     #[inline]
-    pub fn around(&self, place: usize) -> [[f32; 3]; 3] {
-        let row = |first: usize| [self.cells[first], self.cells[first + 1], self.cells[first + 2]];
-        [row(place - FRAMED - 1), row(place - 1), row(place + FRAMED - 1)]
+    pub fn around(&self, column: usize, row: usize) -> [f32; 9] {
+        let place = Self::place(column, row);
+        let [above, here, below] = [place - FRAMED, place, place + FRAMED]
+            .map(|at| [self.cells[at - 1], self.cells[at], self.cells[at + 1]]);
+        [above[0], above[1], above[2], here[0], here[1], here[2], below[0], below[1], below[2]]
     }
 
     /// Whether the left, right, upper and lower neighbours have other colours.
     #[inline]
-    pub fn steps(&self, place: usize) -> [bool; 4] {
-        self.steps[place]
+    pub fn steps(&self, column: usize, row: usize) -> [bool; 4] {
+        self.steps[Self::place(column, row)]
     }
 
     /// Whether a cell is white.

@@ -30,25 +30,37 @@ impl RayGrid {
         Self { columns, nodes: (0..columns * rows).map(node).collect() }
     }
 
-    /// The rays of the pixels `first..first + out.len()` of a row of the image.
-    pub fn row(&self, y: usize, first: usize, out: &mut [[f32; 2]]) {
-        let (above, share_y) = (y / STEP, (y % STEP) as f32 / STEP as f32);
-        let node = |i: usize| {
-            let a = self.nodes[above * self.columns + i];
-            let b = self.nodes[(above + 1) * self.columns + i];
-            [a[0] + share_y * (b[0] - a[0]), a[1] + share_y * (b[1] - a[1])]
-        };
-        let mut left = first / STEP;
-        let (mut a, mut b) = (node(left), node(left + 1));
-        for (k, ray) in out.iter_mut().enumerate() {
-            let x = first + k;
-            if x / STEP != left {
-                left = x / STEP;
-                (a, b) = (b, node(left + 1));
-            }
-            let share = (x % STEP) as f32 / STEP as f32;
-            *ray = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
+    /// The rays of one row of the image.
+    pub fn row(&self, y: usize) -> RayRow<'_> {
+        let first = y / STEP * self.columns;
+        RayRow {
+            above: &self.nodes[first..first + self.columns],
+            below: &self.nodes[first + self.columns..first + 2 * self.columns],
+            share: (y % STEP) as f32 / STEP as f32,
         }
+    }
+}
+
+/// Rays of one row of pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct RayRow<'a> {
+    above: &'a [[f32; 2]],
+    below: &'a [[f32; 2]],
+    share: f32,
+}
+
+impl RayRow<'_> {
+    /// The ray of a pixel of the row.
+    #[inline]
+    pub fn at(&self, x: usize) -> [f32; 2] {
+        let (left, share) = (x / STEP, (x % STEP) as f32 / STEP as f32);
+        let (a, b) = (self.above[left], self.above[left + 1]);
+        let (c, d) = (self.below[left], self.below[left + 1]);
+        std::array::from_fn(|axis| {
+            let upper = a[axis] + share * (b[axis] - a[axis]);
+            let lower = c[axis] + share * (d[axis] - c[axis]);
+            upper + self.share * (lower - upper)
+        })
     }
 }
 
@@ -63,15 +75,12 @@ mod tests {
         const TOLERANCE_PX: f64 = 1e-3;
         let camera = &testing::rig().cameras[0];
         let sut = RayGrid::new(camera);
-        let mut rays = [[0.0; 2]; 100];
         for y in [0, 1, 357, 719] {
-            for first in [0, 3, 600, 1180] {
-                sut.row(y, first, &mut rays);
-                for (k, ray) in rays.iter().enumerate() {
-                    let exact = camera.unproject(&Point2::new((first + k) as f64, y as f64));
-                    let error = (f64::from(ray[0]) - exact.x).hypot(f64::from(ray[1]) - exact.y);
-                    assert!(error * camera.focal_px.x < TOLERANCE_PX, "{error}");
-                }
+            for x in (0..1280).step_by(7) {
+                let ray = sut.row(y).at(x);
+                let exact = camera.unproject(&Point2::new(x as f64, y as f64));
+                let error = (f64::from(ray[0]) - exact.x).hypot(f64::from(ray[1]) - exact.y);
+                assert!(error * camera.focal_px.x < TOLERANCE_PX, "{error}");
             }
         }
     }

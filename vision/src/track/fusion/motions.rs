@@ -14,6 +14,28 @@ pub struct Motions {
 }
 
 impl Motions {
+    /// Motions that were described elsewhere: one for each shell, in the order of the shells; they may be
+    /// trusted for `horizon_ns` after their time.
+    pub fn new(motions: Vec<Option<Motion>>, horizon_ns: u64) -> Self {
+        Self { hinges: vec![None; motions.len()], motions, horizon_ns }
+    }
+
+    /// Each as of its last measurement.
+    pub fn latest(&self) -> &[Option<Motion>] {
+        &self.motions
+    }
+
+    /// For how long after its measurement a motion may be trusted.
+    pub fn horizon_ns(&self) -> u64 {
+        self.horizon_ns
+    }
+
+    /// Which shells are not lost.
+    pub fn known_at(&self, time_ns: u64) -> Vec<bool> {
+        let known = |motion: &Option<Motion>| motion.as_ref().is_some_and(|m| self.is_recent(m, time_ns));
+        self.motions.iter().map(known).collect()
+    }
+
     /// The motion of each shell at an instant; `None` for those that are lost.
     pub fn at(&self, time_ns: u64, settings: &TrackerSettings) -> Vec<Option<Motion>> {
         let at = |motion: &Option<Motion>| {
