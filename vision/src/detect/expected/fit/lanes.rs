@@ -6,6 +6,8 @@
     expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
 )]
 
+use wide::f32x8;
+
 use super::UNKNOWNS;
 
 /// Pixels side by side.
@@ -132,37 +134,39 @@ mod avx2 {
 /// Derivatives and residuals.
 #[inline(always)]
 fn derive(pixels: &[Pixels], stride: usize, picture: &Picture, out: &mut [Derivatives]) {
-    let g = &picture.cells_from_local;
-    let contrast = picture.contrast;
+    let g = picture.cells_from_local.map(f32x8::splat);
+    let [black, contrast, mixed] = [picture.black, picture.contrast, picture.mixed].map(f32x8::splat);
+    let [inv_blur_u, inv_blur_v] = picture.inv_blur.map(f32x8::splat);
     for (pixels, out) in pixels.iter().step_by(stride).zip(out) {
-        for lane in 0..LANES {
-            let (x, y) = (pixels.x[lane], pixels.y[lane]);
-            let weight = pixels.weight[lane];
-            let inv_w = 1.0 / (g[6] * x + g[7] * y + g[8]);
-            let u = (g[0] * x + g[1] * y + g[2]) * inv_w;
-            let v = (g[3] * x + g[4] * y + g[5]) * inv_w;
-            let across = Weights::new(u - pixels.column[lane], picture.inv_blur[0]);
-            let down = Weights::new(v - pixels.row[lane], picture.inv_blur[1]);
-            let cells: [f32; 9] = std::array::from_fn(|k| pixels.cells[k][lane]);
-            let [t, t_u, t_v, t_hu, t_hv] = shade(&cells, &across, &down, picture.mixed);
-            let scale = weight * contrast;
-            let (a, b) = (scale * t_u * inv_w, scale * t_v * inv_w);
-            let c = -(a * u + b * v);
-            let residual = weight * (pixels.grey[lane] - picture.black - contrast * t);
-            out[0][lane] = a * x;
-            out[1][lane] = a * y;
-            out[2][lane] = a;
-            out[3][lane] = b * x;
-            out[4][lane] = b * y;
-            out[5][lane] = b;
-            out[6][lane] = c * x;
-            out[7][lane] = c * y;
-            out[8][lane] = weight;
-            out[9][lane] = weight * t;
-            out[10][lane] = scale * t_hu;
-            out[11][lane] = scale * t_hv;
-            out[12][lane] = residual;
-        }
+        let (x, y) = (f32x8::new(pixels.x), f32x8::new(pixels.y));
+        let weight = f32x8::new(pixels.weight);
+        let inv_w = f32x8::ONE / (g[6] * x + g[7] * y + g[8]);
+        let u = (g[0] * x + g[1] * y + g[2]) * inv_w;
+        let v = (g[3] * x + g[4] * y + g[5]) * inv_w;
+        let across = Weights::new(u - f32x8::new(pixels.column), inv_blur_u);
+        let down = Weights::new(v - f32x8::new(pixels.row), inv_blur_v);
+        let cells = pixels.cells.map(f32x8::new);
+        let [t, t_u, t_v, t_hu, t_hv] = shade(&cells, &across, &down, mixed);
+        let scale = weight * contrast;
+        let (a, b) = (scale * t_u * inv_w, scale * t_v * inv_w);
+        let c = -(a * u + b * v);
+        let residual = weight * (f32x8::new(pixels.grey) - black - contrast * t);
+        let values = [
+            a * x,
+            a * y,
+            a,
+            b * x,
+            b * y,
+            b,
+            c * x,
+            c * y,
+            weight,
+            weight * t,
+            scale * t_hu,
+            scale * t_hv,
+            residual,
+        ];
+        *out = values.map(f32x8::to_array);
     }
 }
 
@@ -194,7 +198,7 @@ fn sum(lanes: &Lanes) -> f32 {
 
 /// T and its derivatives by u, v, h_u, h_v.
 #[inline(always)]
-fn shade(cells: &[f32; 9], across: &Weights, down: &Weights, mixed: f32) -> [f32; 5] {
+fn shade(cells: &[f32x8; 9], across: &Weights, down: &Weights, mixed: f32x8) -> [f32x8; 5] {
     let (rows, rows_u, rows_h) =
         (along(cells, across.of), along(cells, across.by_place), along(cells, across.by_blur));
     [
@@ -207,7 +211,7 @@ fn shade(cells: &[f32; 9], across: &Weights, down: &Weights, mixed: f32) -> [f32
 }
 
 #[inline(always)]
-fn along(c: &[f32; 9], w: [f32; 3]) -> [f32; 3] {
+fn along(c: &[f32x8; 9], w: [f32x8; 3]) -> [f32x8; 3] {
     [
         w[0] * c[0] + w[1] * c[1] + w[2] * c[2],
         w[0] * c[3] + w[1] * c[4] + w[2] * c[5],
@@ -216,29 +220,30 @@ fn along(c: &[f32; 9], w: [f32; 3]) -> [f32; 3] {
 }
 
 #[inline(always)]
-fn over(w: [f32; 3], rows: [f32; 3]) -> f32 {
+fn over(w: [f32x8; 3], rows: [f32x8; 3]) -> f32x8 {
     w[0] * rows[0] + w[1] * rows[1] + w[2] * rows[2]
 }
 
 /// What a cell and its two neighbours contribute at a place in the cell.
 struct Weights {
-    of: [f32; 3],
-    by_place: [f32; 3],
-    by_blur: [f32; 3],
+    of: [f32x8; 3],
+    by_place: [f32x8; 3],
+    by_blur: [f32x8; 3],
 }
 
 impl Weights {
     /// `place` from 0 to 1 across the cell.
     #[inline(always)]
-    fn new(place: f32, inv_blur: f32) -> Self {
+    fn new(place: f32x8, inv_blur: f32x8) -> Self {
+        let rest = f32x8::ONE - place;
         let (before, slope_before) = beyond(place * inv_blur);
-        let (after, slope_after) = beyond((1.0 - place) * inv_blur);
-        // d(d/h)/dh = −(d/h)/h, and the share beyond falls with d/h.
-        let by_blur_before = slope_before * place * inv_blur * inv_blur;
-        let by_blur_after = slope_after * (1.0 - place) * inv_blur * inv_blur;
+        let (after, slope_after) = beyond(rest * inv_blur);
         let (slope_before, slope_after) = (slope_before * inv_blur, slope_after * inv_blur);
+        // d(d/h)/dh = −(d/h)/h, and the share beyond falls with d/h.
+        let by_blur_before = slope_before * place * inv_blur;
+        let by_blur_after = slope_after * rest * inv_blur;
         Self {
-            of: [before, 1.0 - before - after, after],
+            of: [before, f32x8::ONE - before - after, after],
             by_place: [-slope_before, slope_before - slope_after, slope_after],
             by_blur: [by_blur_before, -by_blur_before - by_blur_after, by_blur_after],
         }
@@ -247,13 +252,13 @@ impl Weights {
 
 /// The share of the kernel that lies beyond an edge at a distance of τ half-widths, and the kernel there.
 #[inline(always)]
-fn beyond(tau: f32) -> (f32, f32) {
-    // Not `clamp`, whose check of its bounds keeps the compiler from vectors.
-    let tau = tau.max(-1.0).min(1.0);
+fn beyond(tau: f32x8) -> (f32x8, f32x8) {
+    let tau = tau.fast_max(-f32x8::ONE).fast_min(f32x8::ONE);
     let t2 = tau * tau;
-    let rest = 1.0 - t2;
-    let share = tau * (1.0 - t2 * (1.0 - t2 * (0.6 - t2 * (1.0 / 7.0))));
-    (0.5 - PEAK * share, PEAK * rest * rest * rest)
+    let rest = f32x8::ONE - t2;
+    let share =
+        tau * (f32x8::ONE - t2 * (f32x8::ONE - t2 * (f32x8::splat(0.6) - t2 * f32x8::splat(1.0 / 7.0))));
+    (f32x8::HALF - f32x8::splat(PEAK) * share, f32x8::splat(PEAK) * rest * rest * rest)
 }
 
 #[cfg(test)]
@@ -271,11 +276,11 @@ mod tests {
         for blur in [[0.3f32, 0.45], [0.9, 0.2]] {
             for k in 0..400 {
                 let (u, v) = (0.3 + 0.47 * (k % 20) as f32, 0.4 + 0.46 * (k / 20) as f32);
-                let cells = pattern.around(u as usize, v as usize);
+                let cells = pattern.around(u as usize, v as usize).map(f32x8::splat);
                 let shade = |du: f32, dv: f32, [hu, hv]: [f32; 2]| {
-                    let across = Weights::new(u - u.floor() + du, 1.0 / hu);
-                    let down = Weights::new(v - v.floor() + dv, 1.0 / hv);
-                    shade(&cells, &across, &down, 0.0)
+                    let across = Weights::new((u - u.floor() + du).into(), (1.0 / hu).into());
+                    let down = Weights::new((v - v.floor() + dv).into(), (1.0 / hv).into());
+                    shade(&cells, &across, &down, f32x8::ZERO).map(|all| all.to_array()[0])
                 };
                 let at = |du: f32, dv: f32, h: [f32; 2]| shade(du, dv, h)[0];
                 let [hu, hv] = blur;
