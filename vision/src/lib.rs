@@ -2,12 +2,12 @@
 //!
 //! ```text
 //!  source ──► FrameSet ──► detect ────────► pose ─────────► track ──────► TrackUpdate
-//!  recording  one frame    tags in each     one shell from  filter,       poses, verdicts,
-//!  folder     a camera,    image: whole,    all corners in  prediction,   covariances,
-//!  video      one instant  or predicted     all views       verdict,      tags, durations
-//!  device                  regions                          next regions ─┐
-//!                             ▲                                           │
-//!                             └───────────────────────────────────────────┘
+//!  recording  frames       expected tags    one shell from  filter,       poses, verdicts,
+//!  folder     exposed      are read, what   all corners in  prediction,   covariances,
+//!  video      together     is lost is       all views, each verdict,      tags, durations
+//!  device                  searched         at its own time motions ─────┐
+//!                             ▲                                          │
+//!                             └──────────────────────────────────────────┘
 //!  rig (cameras) and shells (tags) come from files: `configs/rigs`, `configs/shells`
 //! ```
 //!
