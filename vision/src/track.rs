@@ -38,6 +38,7 @@ pub use admission::Dropped;
 pub use eye::Eye;
 pub use filter::{FilterSettings, Manoeuvre, Motion};
 pub use fusion::{Fusion, Motions};
+pub use hinge::Hinge;
 pub use scout::Scout;
 pub use settings::TrackerSettings;
 pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};

@@ -205,6 +205,11 @@ impl TagOwners {
         self.0.keys().copied().collect()
     }
 
+    /// Index of the shell that a tag is on.
+    pub fn shell_of(&self, id: u32) -> Option<usize> {
+        self.0.get(&id).map(|(shell, _)| *shell)
+    }
+
     /// Names the shell of each detection; those that are on none are left out.
     pub fn assign(&self, found: Vec<Detection>) -> Vec<SeenTag> {
         let seen = |detection: Detection| {
