@@ -101,7 +101,7 @@ impl Outcome {
         let views = tracker.rig().cameras.iter().enumerate().zip(&instant.sightings);
         for ((index, camera), sightings) in views {
             let Some(update) = update.camera(index) else { continue };
-            for seen in update.tags.iter().filter(|seen| seen.used) {
+            for seen in update.tags.iter().filter(|seen| seen.is_used()) {
                 let error_px = self.worst_corner_px(instant, camera, seen, tracker.shells());
                 self.false_accepted += usize::from(error_px > FALSE_TAG_PX);
             }
