@@ -15,6 +15,8 @@ use crate::operator::motion::Body;
 const RATE_HZ: f64 = 30.0;
 /// When the hands go at full speed.
 const BEGIN_S: f64 = 2.0;
+/// So much earlier the trackers begin: what they make of a first sight is not measured here.
+const EARLIER_S: f64 = 0.5;
 /// For how long, by default.
 pub const SECONDS: f64 = 8.0;
 
@@ -30,13 +32,22 @@ pub struct Outcome {
 /// Films and tracks.
 pub fn run(stage: &Stage, seconds: f64) -> anyhow::Result<Outcome> {
     let (mut with_rows, mut without_rows) = (Tally::new(&stage.shells), Tally::new(&stage.shells));
-    let film =
-        Film { studio: &stage.studio, begin_s: BEGIN_S, seconds, rate_hz: RATE_HZ, coding: Coding::Jpeg };
+    let film = Film {
+        studio: &stage.studio,
+        begin_s: BEGIN_S - EARLIER_S,
+        seconds: seconds + EARLIER_S,
+        rate_hz: RATE_HZ,
+        coding: Coding::Jpeg,
+    };
     let mut tracker = stage.tracker()?;
     let mut without = stage.tracker_with(without_row_times(&stage.rig))?;
     film.show(|shot| {
-        with_rows.add(&stage.studio, &shot, &tracker.update(&shot.frames));
-        without_rows.add(&stage.studio, &shot, &without.update(&shot.frames));
+        let shot = shot.decoded()?;
+        let (found, found_without) = (tracker.update(&shot.frames), without.update(&shot.frames));
+        if shot.time_s >= BEGIN_S {
+            with_rows.add(&stage.studio, &shot, &found);
+            without_rows.add(&stage.studio, &shot, &found_without);
+        }
         Ok(())
     })?;
     Ok(Outcome { with_rows, without_rows })

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::operator::encode;
 use crate::operator::schedule::{FIRST_CAPTURE_NS, Moment};
 use crate::operator::sight::Sighting;
-use crate::operator::studio::Studio;
+use crate::operator::studio::{Picture, Studio};
 use crate::operator::{Schedule, motion::Posture};
 
 /// Moments that are rendered before any is shown: enough to keep all cores busy, few to hold.
@@ -54,10 +54,7 @@ pub struct Shot {
 impl Film<'_> {
     /// Renders on all cores, and shows each moment in the order of time.
     pub fn show(&self, mut watch: impl FnMut(Shot) -> anyhow::Result<()>) -> anyhow::Result<()> {
-        let schedule = Schedule::new(self.begin_s + self.seconds, self.rate_hz)?;
-        let mut moments = schedule.moments(self.studio);
-        moments.retain(|moment| moment.time_s >= self.begin_s);
-        for batch in moments.chunks(BATCH) {
+        for batch in self.moments()?.chunks(BATCH) {
             let shots: Vec<Shot> =
                 batch.par_iter().map(|moment| self.shot(moment)).collect::<anyhow::Result<_>>()?;
             shots.into_iter().try_for_each(&mut watch)?;
@@ -65,15 +62,36 @@ impl Film<'_> {
         Ok(())
     }
 
+    /// The same where nothing moves: rendered once, and developed for each moment with noise of its own.
+    pub fn show_still(&self, mut watch: impl FnMut(Shot) -> anyhow::Result<()>) -> anyhow::Result<()> {
+        let cameras = 0..self.studio.cameras().len();
+        let look = |camera: usize| {
+            (self.studio.expose(camera, self.begin_s), self.studio.sightings(camera, self.begin_s))
+        };
+        let exposed: Vec<_> = cameras.into_par_iter().map(look).collect();
+        for moment in self.moments()? {
+            let frame = |&camera: &usize| {
+                self.frame(camera, &moment, self.studio.develop(&exposed[camera].0, moment.frame))
+            };
+            let frames = moment.cameras.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+            let sightings =
+                moment.cameras.iter().map(|camera| (*camera, exposed[*camera].1.clone())).collect();
+            watch(Shot { time_s: moment.time_s, frames: FrameSet { frames }, sightings })?;
+        }
+        Ok(())
+    }
+
+    fn moments(&self) -> anyhow::Result<Vec<Moment>> {
+        let schedule = Schedule::new(self.begin_s + self.seconds, self.rate_hz)?;
+        let mut moments = schedule.moments(self.studio);
+        moments.retain(|moment| moment.time_s >= self.begin_s);
+        Ok(moments)
+    }
+
     fn shot(&self, moment: &Moment) -> anyhow::Result<Shot> {
         let cameras = &moment.cameras;
-        let frame = |&camera: &usize| -> anyhow::Result<Frame> {
-            let picture = self.studio.picture(camera, moment.time_s, moment.frame);
-            let pixels = match self.coding {
-                Coding::Jpeg => Pixels::Encoded(encode::jpeg(&picture)?),
-                Coding::Raw => Pixels::Gray(GrayImage::new(picture.width, picture.height, picture.grey)?),
-            };
-            Ok(Frame { camera, capture_ns: moment.capture_ns, pixels })
+        let frame = |&camera: &usize| {
+            self.frame(camera, moment, self.studio.picture(camera, moment.time_s, moment.frame))
         };
         let sightings = |&camera: &usize| (camera, self.studio.sightings(camera, moment.time_s));
         Ok(Shot {
@@ -81,6 +99,26 @@ impl Film<'_> {
             frames: FrameSet { frames: cameras.iter().map(frame).collect::<anyhow::Result<_>>()? },
             sightings: cameras.iter().map(sightings).collect(),
         })
+    }
+
+    fn frame(&self, camera: usize, moment: &Moment, picture: Picture) -> anyhow::Result<Frame> {
+        let pixels = match self.coding {
+            Coding::Jpeg => Pixels::Encoded(encode::jpeg(&picture)?),
+            Coding::Raw => Pixels::Gray(GrayImage::new(picture.width, picture.height, picture.grey)?),
+        };
+        Ok(Frame { camera, capture_ns: moment.capture_ns, pixels })
+    }
+}
+
+impl Shot {
+    /// The same with images that are decoded already, for several trackers that look at them.
+    pub fn decoded(mut self) -> anyhow::Result<Self> {
+        for frame in &mut self.frames.frames {
+            if let Pixels::Encoded(bytes) = &frame.pixels {
+                frame.pixels = Pixels::Gray(GrayImage::decode(bytes)?);
+            }
+        }
+        Ok(self)
     }
 }
 

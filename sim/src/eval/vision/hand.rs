@@ -6,6 +6,7 @@
 use nalgebra::Isometry3;
 
 use super::film::{Coding, Film, scene_s, truth_at};
+use super::harm::Trial;
 use super::stage::Stage;
 use super::tally::Tally;
 use crate::eval::statistics::rms;
@@ -49,14 +50,16 @@ impl Ahead {
     }
 }
 
-/// Films and tracks.
-pub fn run(stage: &Stage, seconds: f64) -> anyhow::Result<Outcome> {
+/// Films and tracks; the trials see the same film.
+pub fn run(stage: &Stage, seconds: f64, trials: &mut [Trial]) -> anyhow::Result<Outcome> {
     let none = vec![Ahead::default(); stage.shells.shells.len()];
     let mut outcome = Outcome { now: Tally::new(&stage.shells), predicted: none.clone(), held: none };
     let film =
         Film { studio: &stage.studio, begin_s: BEGIN_S, seconds, rate_hz: RATE_HZ, coding: Coding::Jpeg };
     let mut tracker = stage.tracker()?;
     film.show(|shot| {
+        let shot = shot.decoded()?;
+        trials.iter_mut().try_for_each(|trial| trial.see(stage, &shot))?;
         let update = tracker.update(&shot.frames);
         outcome.now.add(&stage.studio, &shot, &update);
         let then_ns = update.time_ns + AHEAD_NS;

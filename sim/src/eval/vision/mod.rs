@@ -9,11 +9,13 @@
 //! measured (`Tracked`). Everything is synthetic: calibration is perfect unless a part disturbs it.
 
 mod bound;
+mod corners;
 mod covariance;
 mod error;
 mod fast;
 mod film;
 mod hand;
+mod harm;
 mod ledger;
 mod plot;
 mod stage;
@@ -27,6 +29,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use super::Report;
+use harm::{HARMS, Trial};
 use ledger::Ledger;
 use stage::Stage;
 use tally::Tally;
@@ -55,6 +58,10 @@ pub enum Part {
     Covariance,
     /// 40 ms ahead of hands that reach, pause and tremble.
     Prediction,
+    /// Corners of single tags, beside the library's.
+    Corners,
+    /// Tags hidden, misread, exchanged.
+    Outliers,
 }
 
 impl Part {
@@ -94,10 +101,17 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
         }
         films.push(("fast", outcome.with_rows));
     }
-    if wants(Part::Prediction) || wants(Part::Covariance) {
+    if wants(Part::Prediction) || wants(Part::Covariance) || wants(Part::Outliers) {
         let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
-        let outcome = hand::run(&stage, seconds(hand::SECONDS))?;
+        let harms = if wants(Part::Outliers) { &HARMS[..] } else { &[] };
+        let mut trials =
+            harms.iter().map(|harm| Trial::new(&stage, *harm, seed)).collect::<anyhow::Result<Vec<_>>>()?;
+        let outcome = hand::run(&stage, seconds(hand::SECONDS), &mut trials)?;
         enter("hand", &outcome.now)?;
+        for trial in &trials {
+            trial.report(&mut report);
+            enter(trial.name(), trial.tally())?;
+        }
         if wants(Part::Prediction) {
             hand::report(&outcome, &mut report);
         }
@@ -106,6 +120,9 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
     if wants(Part::Covariance) {
         let films: Vec<(&str, &Tally)> = films.iter().map(|(name, tally)| (*name, tally)).collect();
         covariance::report(&films, &mut report);
+    }
+    if wants(Part::Corners) {
+        corners::run(seed, &mut report)?;
     }
     ledger.report(&mut report);
     Ok(report)

@@ -24,7 +24,7 @@ use crate::operator::studio::Picture;
 /// Images a second of each camera.
 const RATE_HZ: f64 = 30.0;
 /// Postures.
-const POSTURES: u64 = 5;
+const POSTURES: u64 = 12;
 /// How long each is held, by default.
 pub const SECONDS: f64 = 1.5;
 /// When the filter has settled.
@@ -56,7 +56,7 @@ pub fn run(stage: &Stage, seed: u64, seconds: f64, report: &mut Report) -> anyho
         let film =
             Film { studio: &stage.studio, begin_s: 0.0, seconds, rate_hz: RATE_HZ, coding: Coding::Jpeg };
         let mut tracker = stage.tracker()?;
-        film.show(|shot| {
+        film.show_still(|shot| {
             tally.add(&stage.studio, &shot, &tracker.update(&shot.frames));
             Ok(())
         })?;
@@ -103,7 +103,7 @@ fn still(stage: &Stage, film: &Film<'_>, jitters: &mut [Jitter]) -> anyhow::Resu
     let mut filtered: Vec<Vec<Isometry3<f64>>> = vec![Vec::new(); jitters.len()];
     let mut single = filtered.clone();
     let mut last = None;
-    film.show(|shot| {
+    film.show_still(|shot| {
         let update = tracker.update(&shot.frames);
         for (shell, found) in update.shells.iter().enumerate() {
             let settled = shot.time_s >= SETTLED_S && found.verdict == Verdict::Tracked;
