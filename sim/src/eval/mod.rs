@@ -36,7 +36,7 @@ pub struct Args {
 #[derive(Debug, Clone, PartialEq, clap::Subcommand)]
 pub enum Experiment {
     /// Poses from rendered images against the truth.
-    Vision,
+    Vision(vision::Args),
     /// A recorded session of the demo: following, latency, control period.
     Demo {
         /// What the station recorded.
@@ -57,7 +57,7 @@ pub enum Experiment {
 pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let plot = args.json.as_ref().map(|json| json.with_extension("svg"));
     let report = match &args.experiment {
-        Experiment::Vision => vision::run(configs, args.seed, plot.as_deref())?,
+        Experiment::Vision(of) => vision::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,

@@ -13,6 +13,8 @@ pub enum Must {
     AtMost(f64),
     /// At least this.
     AtLeast(f64),
+    /// At least the first, at most the second.
+    Between(f64, f64),
 }
 
 impl Must {
@@ -21,6 +23,7 @@ impl Must {
         match self {
             Self::AtMost(limit) => value <= *limit,
             Self::AtLeast(limit) => value >= *limit,
+            Self::Between(low, high) => (*low..=*high).contains(&value),
         }
     }
 }
@@ -30,6 +33,7 @@ impl fmt::Display for Must {
         match self {
             Self::AtMost(limit) => write!(f, "<= {limit}"),
             Self::AtLeast(limit) => write!(f, ">= {limit}"),
+            Self::Between(low, high) => write!(f, "{low} to {high}"),
         }
     }
 }

@@ -117,7 +117,7 @@ fn add_pair(out: &mut [f32], a: &[f32], b: &[f32], weight: f32) {
 /// A number of zero mean and unit variance from 64 random bits: the sum of four uniform ones, whose
 /// distribution is normal up to 3.4 standard deviations.
 #[inline]
-fn gaussian(bits: u64) -> f32 {
+pub fn gaussian(bits: u64) -> f32 {
     // Four numbers of 16 bits have the variance 4 * 2^32 / 12.
     const UNIT: f32 = 1.732_050_8 / 65536.0;
     let sum = (bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48);

@@ -71,6 +71,14 @@ pub struct Picture {
     pub jpeg_quality: i32,
 }
 
+/// An exposed picture before blur and noise: where nothing moves, one serves many pictures.
+#[derive(Debug, Clone)]
+pub struct Negative {
+    camera: usize,
+    light: Vec<f32>,
+    brightness: f32,
+}
+
 /// A scene that cannot be played before these cameras with these shells.
 #[derive(Debug, thiserror::Error)]
 pub enum StudioError {
@@ -189,6 +197,11 @@ impl Studio {
 
     /// The picture that a camera of the rig takes with this capture time; `frame` picks its noise.
     pub fn picture(&self, camera: usize, t_s: f64, frame: u64) -> Picture {
+        self.develop(&self.expose(camera, t_s), frame)
+    }
+
+    /// The light that falls on a camera's pixels for a picture with this capture time.
+    pub fn expose(&self, camera: usize, t_s: f64) -> Negative {
         let stand = &self.stands[camera];
         let place = stand.at(t_s);
         let Camera { id, width, height, .. } = &place.camera;
@@ -207,12 +220,18 @@ impl Studio {
                 })
             }
         };
-        let seed = mix(self.seed ^ mix(camera as u64 ^ mix(frame)));
+        Negative { camera, light, brightness: brightness as f32 }
+    }
+
+    /// A picture of such light; `frame` picks its noise.
+    pub fn develop(&self, negative: &Negative, frame: u64) -> Picture {
+        let stand = &self.stands[negative.camera];
+        let seed = mix(self.seed ^ mix(negative.camera as u64 ^ mix(frame)));
         Picture {
-            width: *width,
-            height: *height,
-            grey: stand.developer.develop(&light, brightness as f32, seed),
-            jpeg_quality: scene.sensor.jpeg_quality,
+            width: stand.place.camera.width,
+            height: stand.place.camera.height,
+            grey: stand.developer.develop(&negative.light, negative.brightness, seed),
+            jpeg_quality: self.scene().sensor.jpeg_quality,
         }
     }
 

@@ -3,7 +3,7 @@
 //!
 //! Thumb tags are too small for a search of the whole image: a lost thumb is searched round its palm.
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 
 use super::TrackerSettings;
 use super::filter::Motion;
@@ -35,29 +35,67 @@ pub(super) fn expected_tags(
     expected: &mut Vec<Expected>,
 ) {
     expected.clear();
-    let camera_from_shell = camera.world_from_camera.inverse() * motion.world_from_shell;
     let doubt_px = doubt_px(camera, shell, motion, settings);
     for (index, tag) in shell.tags.iter().enumerate() {
+        let Exposed { camera_from_shell, sheared } = Exposed::of(camera, motion, &tag.center());
         let camera_from_tag = camera_from_shell * tag.shell_from_tag;
         let center = camera_from_tag.translation.vector;
         let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center.normalize());
         if facing < FACING_COS {
             continue;
         }
-        let corners = tag.corners().map(|corner| camera.project(&(camera_from_shell * corner)));
+        let corners = tag.corners().map(|corner| camera.project(&(sheared * (camera_from_shell * corner))));
         let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
         let corners_px = [a, b, c, d];
         if !corners_px.iter().all(|corner| camera.contains(corner)) {
             continue;
         }
+        let expectation = Expectation::from_pose(tag.id, &camera_from_tag, tag.size_m, doubt_px);
+        let ideal_from_cells = sheared * expectation.ideal_from_cells;
         expected.push(Expected {
             tag: index,
-            expectation: Expectation::from_pose(tag.id, &camera_from_tag, tag.size_m, doubt_px),
+            expectation: Expectation { ideal_from_cells, ..expectation },
             corners_px,
             area_px2: (c - a).perp(&(d - b)).abs(),
         });
     }
     expected.sort_by(|a, b| b.area_px2.total_cmp(&a.area_px2));
+}
+
+/// A place on a moving shell, as the rows of a rolling shutter see it: at 1 m/s, rows that are exposed 14 ms before or
+/// after the middle one see a tag 30 pixels from where it is at the capture time.
+struct Exposed {
+    /// The shell's pose when the row is exposed that sees the place.
+    camera_from_shell: Isometry3<f64>,
+    /// What the rows above and below it do to points about the place, in the camera frame: each is seen earlier or later,
+    /// P' = P + v Δt, with Δt proportional to its distance from the row as that of the pinhole.
+    sheared: Matrix3<f64>,
+}
+
+impl Exposed {
+    fn of(camera: &Camera, motion: &Motion, place: &Point3<f64>) -> Self {
+        /// Each brings the row nearer by the share of a row's time in which the image moves by a row: a twentieth.
+        const STEPS: usize = 2;
+        let camera_from_world = camera.world_from_camera.inverse();
+        let mut camera_from_shell = camera_from_world * motion.world_from_shell;
+        if camera.line_time_s == 0.0 {
+            return Self { camera_from_shell, sheared: Matrix3::identity() };
+        }
+        let state = motion.state();
+        let mut delay_s = 0.0;
+        for _ in 0..STEPS {
+            let Some(pixel) = camera.project(&(camera_from_shell * place)) else { break };
+            delay_s = camera.row_delay_s(pixel.y);
+            camera_from_shell = camera_from_world * state.pose_after(delay_s);
+        }
+        let in_camera = camera_from_shell * place;
+        let turning = camera_from_shell.rotation * state.rate_rad_s.cross(&place.coords);
+        let moving = state.velocity_m_s + state.acceleration_m_s2 * delay_s;
+        let velocity = camera_from_world.rotation * moving + turning;
+        let rows_per_m = camera.focal_px.y / in_camera.z;
+        let later = Vector3::new(0.0, 1.0, -in_camera.y / in_camera.z) * (camera.line_time_s * rows_per_m);
+        Self { camera_from_shell, sheared: Matrix3::identity() + velocity * later.transpose() }
+    }
 }
 
 /// How far from where they are expected a shell's tags may be.
@@ -76,7 +114,7 @@ pub(super) fn tags_region(
     motion: &Motion,
     settings: &TrackerSettings,
 ) -> Option<Region> {
-    let camera_from_shell = camera.world_from_camera.inverse() * motion.world_from_shell;
+    let Exposed { camera_from_shell, .. } = Exposed::of(camera, motion, &Point3::origin());
     let mut bounds = Bounds::default();
     let mut largest_side_px: f64 = 0.0;
     for tag in &shell.tags {
@@ -148,3 +186,6 @@ impl Bounds {
         Rect::clipped(min, max, camera.width, camera.height)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::Context;
 use plotters::prelude::*;
 
-use super::measure::{Outcome, PoseError, ShellOutcome};
+use super::error::PoseError;
+use super::tally::{ShellTally, Tally};
 
 const SIZE_PX: (u32, u32) = (1000, 640);
 /// One a shell, told apart by people who see few colours too.
@@ -20,25 +21,25 @@ const COLOURS: [RGBColor; 5] = [
 const GAP_S: f64 = 0.2;
 
 /// Draws position errors above, rotation errors below, as SVG.
-pub fn draw(path: &Path, outcome: &Outcome) -> anyhow::Result<()> {
+pub fn draw(path: &Path, tally: &Tally) -> anyhow::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
     let area = SVGBackend::new(path, SIZE_PX).into_drawing_area();
     area.fill(&WHITE)?;
     let (above, below) = area.split_vertically(SIZE_PX.1 / 2);
-    panel(&above, outcome, "position error, mm", |error| 1e3 * error.position_m)?;
-    panel(&below, outcome, "rotation error, deg", |error| error.rotation_rad.to_degrees())?;
+    panel(&above, tally, "position error, mm", |error| 1e3 * error.position_m.norm())?;
+    panel(&below, tally, "rotation error, deg", |error| error.rotation_rad.norm().to_degrees())?;
     area.present().context("the file cannot be written")
 }
 
 fn panel(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-    outcome: &Outcome,
+    tally: &Tally,
     caption: &str,
     value: impl Fn(&PoseError) -> f64,
 ) -> anyhow::Result<()> {
-    let errors = || outcome.shells.iter().flat_map(|shell| &shell.errors);
+    let errors = || tally.shells.iter().flat_map(|shell| &shell.errors);
     let times = || errors().map(|error| error.time_s);
     let begin_s = times().fold(f64::INFINITY, f64::min);
     let end_s = times().fold(f64::NEG_INFINITY, f64::max);
@@ -53,7 +54,7 @@ fn panel(
         .y_label_area_size(48)
         .build_cartesian_2d(begin_s..end_s, 0.0..1.05 * top)?;
     chart.configure_mesh().x_desc("time of the scene, s").light_line_style(WHITE).draw()?;
-    for (shell, colour) in outcome.shells.iter().zip(COLOURS.iter().cycle()) {
+    for (shell, colour) in tally.shells.iter().zip(COLOURS.iter().cycle()) {
         for (i, line) in stretches(shell).enumerate() {
             let points = line.iter().map(|error| (error.time_s, value(error)));
             let drawn = chart.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
@@ -72,6 +73,6 @@ fn panel(
 }
 
 /// Errors without long pauses between them.
-fn stretches(shell: &ShellOutcome) -> impl Iterator<Item = &[PoseError]> {
+fn stretches(shell: &ShellTally) -> impl Iterator<Item = &[PoseError]> {
     shell.errors.chunk_by(|a, b| b.time_s - a.time_s < GAP_S)
 }
