@@ -1,8 +1,8 @@
 //! Time to read all expected tags of five shells in one image, beside the plain library's search of it.
 //!
-//! `cargo xtask bench`, or `cargo bench -p locoman-vision --bench read`. Processor time of one thread. The image
-//! is drawn by nearest neighbours, which is all that timing needs: accuracy is measured by `cargo xtask eval
-//! vision`. What counts is the ratio within one run.
+//! `cargo xtask bench`, or `cargo bench --profile dev -p locoman-vision --bench read`. Processor time of one thread. Each
+//! pixel is the mean of some points in it, smoothed like by a lens, with noise: how many steps a fit takes depends on that.
+//! Accuracy is measured by `cargo xtask eval vision`. What counts is the ratio within one run.
 
 #![expect(clippy::expect_used, reason = "in a benchmark a panic is the report")]
 
@@ -80,10 +80,14 @@ fn places(camera: &Camera) -> Vec<Expectation> {
     places
 }
 
-/// The tags on grey, each shifted by a pixel, smoothed once.
+/// The tags on grey, each shifted by a pixel, smoothed once, with noise of two grey levels on them. The grey has none: it
+/// would cost the library most of its time.
 fn draw(camera: &Camera, expected: &[Expectation]) -> GrayImage {
+    /// Points along a pixel's side.
+    const FINE: usize = 4;
+    const BACKGROUND: f32 = 120.0;
     let (width, height) = (camera.width as usize, camera.height as usize);
-    let mut pixels = vec![120.0_f32; width * height];
+    let mut pixels = vec![BACKGROUND; width * height];
     for tag in expected {
         let cells_from_ideal: Matrix3<f64> = tag.ideal_from_cells.try_inverse().expect("regular");
         let bitmap = tag_bitmap(tag.id).expect("known id");
@@ -91,13 +95,16 @@ fn draw(camera: &Camera, expected: &[Expectation]) -> GrayImage {
         let center = camera.pixel_of_ideal(Vector2::new(middle.x / middle.z, middle.y / middle.z));
         for y in (center.y as usize).saturating_sub(70)..(center.y as usize + 70).min(height) {
             for x in (center.x as usize).saturating_sub(70)..(center.x as usize + 70).min(width) {
-                let ray = camera.unproject(&Point2::new(x as f64 - 1.0, y as f64 + 0.6));
-                let cell = cells_from_ideal * ray;
-                let (u, v) = ((cell.x / cell.z).floor(), (cell.y / cell.z).floor());
-                if (0.0..10.0).contains(&u) && (0.0..10.0).contains(&v) {
-                    let white = bitmap.row(v as u32)[u as usize] != 0;
-                    pixels[y * width + x] = if white { 200.0 } else { 40.0 };
-                }
+                let points = (0..FINE * FINE).map(|k| {
+                    let place = |k: usize| (k as f64 + 0.5) / FINE as f64 - 0.5;
+                    let (x, y) = (x as f64 + place(k % FINE), y as f64 + place(k / FINE));
+                    let cell = cells_from_ideal * camera.unproject(&Point2::new(x - 1.0, y + 0.6));
+                    let (u, v) = ((cell.x / cell.z).floor(), (cell.y / cell.z).floor());
+                    let inside = (0.0..10.0).contains(&u) && (0.0..10.0).contains(&v);
+                    let level = |white: bool| if white { 200.0 } else { 40.0 };
+                    if inside { level(bitmap.row(v as u32)[u as usize] != 0) } else { BACKGROUND }
+                });
+                pixels[y * width + x] = points.sum::<f32>() / (FINE * FINE) as f32;
             }
         }
     }
@@ -106,7 +113,17 @@ fn draw(camera: &Camera, expected: &[Expectation]) -> GrayImage {
         let (x, y) = (k % width, k / width);
         let (left, above) = (x.saturating_sub(1), y.saturating_sub(1));
         let line = |y: usize| at(left, y) + 2.0 * at(x, y) + at(x + 1, y);
-        ((line(above) + 2.0 * line(y) + line(y + 1)) / 16.0).round() as u8
+        (line(above) + 2.0 * line(y) + line(y + 1)) / 16.0
+    };
+    let mut seed = 1_u64;
+    let mut noise = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        // A uniform number has a variance of a twelfth: two grey levels.
+        ((seed >> 40) as f32 / (1_u64 << 24) as f32 - 0.5) * 2.0 * 12_f32.sqrt()
+    };
+    let smooth = |k: usize| {
+        let level = smooth(k);
+        (if level == BACKGROUND { level } else { level + noise() }).round() as u8
     };
     GrayImage::new(camera.width, camera.height, (0..width * height).map(smooth).collect()).expect("size")
 }

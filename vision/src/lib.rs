@@ -19,6 +19,7 @@
 //! pixel centres at integers; corners of a tag in the order bottom left, bottom right, top right, top left.
 
 pub mod camera;
+mod cholesky;
 pub mod config;
 pub mod detect;
 pub mod image;

@@ -89,6 +89,8 @@ pub struct TagPicture {
     pub id: u32,
     /// Standard deviation of the blur.
     pub blur_px: f64,
+    /// How far the tag moves to the right while it is exposed.
+    pub motion_px: f64,
     /// Standard deviation of the noise; white is 160 above black.
     pub noise_levels: f64,
 }
@@ -136,23 +138,29 @@ impl TagPicture {
         }
         let sigma = self.blur_px * FINE as f64;
         let reach = (REACH_SIGMAS * sigma).ceil() as isize;
-        let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        let blurred = |lights: &[f64], stride: usize, count: usize, at: usize, k: usize| -> f64 {
-            let sum: f64 = weights
-                .iter()
-                .zip(-reach..=reach)
-                .map(|(w, offset)| {
-                    let other = k.saturating_add_signed(offset).min(count - 1);
-                    w * lights[at - k * stride + other * stride]
-                })
-                .sum();
-            sum / total
+        let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+        let moves = (0.5 * self.motion_px * FINE as f64).round() as isize;
+        let streak = vec![1.0; (2 * moves + 1) as usize];
+        let blurred =
+            |lights: &[f64], weights: &[f64], stride: usize, count: usize, at: usize, k: usize| -> f64 {
+                let reach = (weights.len() / 2) as isize;
+                let total: f64 = weights.iter().sum();
+                let sum: f64 = weights
+                    .iter()
+                    .zip(-reach..=reach)
+                    .map(|(w, offset)| {
+                        let other = k.saturating_add_signed(offset).min(count - 1);
+                        w * lights[at - k * stride + other * stride]
+                    })
+                    .sum();
+                sum / total
+            };
+        let along = |lights: &[f64], weights: &[f64]| -> Vec<f64> {
+            (0..lights.len()).map(|at| blurred(lights, weights, 1, across, at, at % across)).collect()
         };
-        let rowwise: Vec<f64> =
-            (0..fine.len()).map(|at| blurred(&fine, 1, across, at, at % across)).collect();
+        let rowwise = along(&along(&fine, &streak), &kernel);
         let fine: Vec<f64> =
-            (0..fine.len()).map(|at| blurred(&rowwise, across, down, at, at / across)).collect();
+            (0..fine.len()).map(|at| blurred(&rowwise, &kernel, across, down, at, at / across)).collect();
         let mut noise = Noise(seed);
         let mut pixels = vec![(BLACK + CONTRAST) as u8; width * height];
         for (j, y) in rows.enumerate() {

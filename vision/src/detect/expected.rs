@@ -1,10 +1,10 @@
 //! Reads tags where they are expected: no search for quadrilaterals, no decoding of unknown codes.
 //!
 //! ```text
-//!  expected homography ──► align ──────► check ────────► fit ───────────► Reading
-//!  (from a predicted       the tag's     do all cells    all its edges,   corners and
-//!   pose, or corners       own pattern,  have the right  in the ideal     their covariance
-//!   found by a search)     shifted       colour?         image
+//!  expected homography ──► align ──────► fit ──────────► check ────────► Reading
+//!  (from a predicted       the tag's     some pixels,    do all cells    corners and
+//!   pose, or corners       own pattern,  then more close have the right  their covariance
+//!   found by a search)     shifted       to its edges    colour?
 //! ```
 //!
 //! What does not look like the tag is refused with the reason, and left to the search by the library.
@@ -14,8 +14,10 @@
 mod align;
 mod fit;
 mod pattern;
+mod places;
 mod rays;
 mod sample;
+mod vector;
 
 use std::collections::BTreeMap;
 
@@ -24,9 +26,12 @@ use nalgebra::{Matrix2, Matrix3, Point2, SMatrix, Vector2, Vector3};
 use super::CornerCovariance;
 use crate::camera::Camera;
 use crate::image::GrayImage;
-use fit::{Appearance, Fit, Samples};
+use align::Cells;
+use fit::{Appearance, Closeness, Fit, Samples};
 use pattern::{CORNERS, MIDDLE, Pattern};
+use places::{Local, Places};
 use rays::RayGrid;
+use sample::{Choice, Picked, Scene};
 
 /// Where a tag is expected.
 #[derive(Debug, Clone, Copy)]
@@ -91,6 +96,16 @@ const FARTHEST_CELLS: f64 = 1.0;
 const START_BLUR_PX: f64 = 2.27;
 /// The kernel's half-width in standard deviations.
 const BLUR_SIGMAS: f64 = 3.0;
+/// First a few pixels farther from the edges, since these may be off by a pixel,
+const COARSE: Choice = Choice { stride: 3, blur_share: 0.4, spare_px: 0.7, turns: 1 };
+/// until the rest is small beside the blur;
+const COARSELY: Closeness = Closeness { most_steps: 6, settled_px: 0.6 };
+/// then more of them close to the edges, where the grey level changes most. Corners do not change by a thousandth of
+/// a pixel if steps are made until they are ten times as small.
+const FINE: Choice = Choice { stride: 1, blur_share: 0.3, spare_px: 0.0, turns: 1 };
+const FINELY: Closeness = Closeness { most_steps: 5, settled_px: 0.1 };
+/// Where motion smears the edges each pixel says less of them: more are taken, up to so many times.
+const MOST_TURNS: f64 = 4.0;
 
 /// Reads expected tags in the images of one camera. One for each thread.
 #[derive(Debug)]
@@ -98,6 +113,7 @@ pub struct Reader {
     camera: Camera,
     rays: RayGrid,
     patterns: BTreeMap<u32, Pattern>,
+    picked: Picked,
     samples: Samples,
 }
 
@@ -152,37 +168,69 @@ impl Reader {
             rays: RayGrid::new(camera),
             camera: camera.clone(),
             patterns: ids.iter().filter_map(|id| Some((*id, Pattern::new(*id)?))).collect(),
+            picked: Picked::default(),
             samples: Samples::default(),
         }
     }
 
     /// Reads one tag.
     pub fn read(&mut self, image: &GrayImage, expectation: &Expectation) -> Result<Reading, Refusal> {
-        let pattern = self.patterns.get(&expectation.id).ok_or(Refusal::Unknown)?;
-        let view = View::new(&self.camera, &expectation.ideal_from_cells)?;
-        let aligned = align::align(image, pattern, &view, expectation.doubt_px)?;
-        let view = view.shifted(&self.camera, aligned.shift_px)?;
-        let blur_cells = view.cells_per_px.map(|cells| START_BLUR_PX * cells);
+        let Self { camera, rays, patterns, picked, samples } = self;
+        let pattern = patterns.get(&expectation.id).ok_or(Refusal::Unknown)?;
+        let view = View::new(camera, &expectation.ideal_from_cells)?;
+        let mut desk = Desk { camera, rays, picked, samples, image, pattern };
+        let here = Cells::read(image, pattern, &view);
+        if align::is_aligned(image, pattern, &view, &here)
+            && let Ok(reading) = desk.read(&view, &here)
+        {
+            return Ok(reading);
+        }
+        let shift_px = align::search(image, pattern, &view, expectation.doubt_px);
+        let view = view.shifted(camera, shift_px)?;
+        let there = Cells::read(image, pattern, &view);
+        align::check_at_first(&there)?;
+        desk.read(&view, &there)
+    }
+}
+
+/// One tag's image, and what it is read with.
+struct Desk<'a> {
+    camera: &'a Camera,
+    rays: &'a RayGrid,
+    picked: &'a mut Picked,
+    samples: &'a mut Samples,
+    image: &'a GrayImage,
+    pattern: &'a Pattern,
+}
+
+impl Desk<'_> {
+    /// Reads a tag that is aligned.
+    fn read(&mut self, view: &View, cells: &Cells) -> Result<Reading, Refusal> {
         let start = Appearance {
             cells_from_local: view.cells_from_local,
-            black: aligned.black,
-            contrast: aligned.white - aligned.black,
-            blur_cells,
+            black: cells.black,
+            contrast: cells.contrast(),
+            blur_cells: view.cells_per_px.map(|cells| START_BLUR_PX * cells),
             correlation: view.correlation,
         };
-        sample::collect(image, pattern, &view, &self.rays, &start, &mut self.samples);
-        let fit = self.samples.fit(&start).ok_or(Refusal::Misfit)?;
-        self.judge(image, pattern, &view, &fit)
+        let mut scene = view.scene(self.image, self.pattern);
+        sample::pick(&scene, self.rays, &start, &COARSE, self.picked, self.samples);
+        let coarse = self.samples.fit(&start, &start, &COARSELY).ok_or(Refusal::Misfit)?.appearance;
+        let local_from_cells = Matrix3::from_row_slice(&coarse.cells_from_local).try_inverse();
+        scene.places = view.local.places(&local_from_cells.ok_or(Refusal::Misfit)?);
+        let smeared = coarse.blur_over(&start).max(1.0);
+        let fine = Choice {
+            blur_share: (FINE.blur_share * smeared).min(1.0),
+            turns: smeared.min(MOST_TURNS).round() as usize,
+            ..FINE
+        };
+        sample::pick(&scene, self.rays, &coarse, &fine, self.picked, self.samples);
+        let fit = self.samples.fit(&coarse, &start, &FINELY).ok_or(Refusal::Misfit)?;
+        self.judge(view, &fit)
     }
 
     /// Whether what was fitted is the tag, and where its corners are.
-    fn judge(
-        &self,
-        image: &GrayImage,
-        pattern: &Pattern,
-        view: &View,
-        fit: &Fit,
-    ) -> Result<Reading, Refusal> {
+    fn judge(&self, view: &View, fit: &Fit) -> Result<Reading, Refusal> {
         let appearance = &fit.appearance;
         if appearance.contrast < LEAST_CONTRAST {
             return Err(Refusal::Contrast);
@@ -190,16 +238,13 @@ impl Reader {
         if fit.noise > MOST_RESIDUAL * appearance.contrast {
             return Err(Refusal::Misfit);
         }
-        let fitted = view.fitted(&self.camera, &appearance.cells_from_local)?;
+        let fitted = view.fitted(self.camera, &appearance.cells_from_local)?;
         let moved_px = (fitted.middle_px - view.middle_px).norm();
         if moved_px * view.cells_per_px[0].max(view.cells_per_px[1]) > FARTHEST_CELLS {
             return Err(Refusal::Misfit);
         }
-        let wrong_cells = align::wrong_cells(image, pattern, &fitted);
-        if wrong_cells > align::MOST_WRONG_CELLS {
-            return Err(Refusal::Cells);
-        }
-        let (corners_px, covariance_px2) = corners(&self.camera, view, fit).ok_or(Refusal::Misfit)?;
+        let wrong_cells = Cells::read(self.image, self.pattern, &fitted).checked()?;
+        let (corners_px, covariance_px2) = corners(self.camera, view, fit).ok_or(Refusal::Misfit)?;
         let sigma_px = |axis: usize| appearance.blur_cells[axis] / view.cells_per_px[axis] / BLUR_SIGMAS;
         Ok(Reading {
             corners_px,
@@ -215,13 +260,11 @@ impl Reader {
 /// How a tag lies in the image.
 #[derive(Debug, Clone, Copy)]
 struct View {
-    /// See [`Expectation`].
-    ideal_from_cells: Matrix3<f64>,
-    /// The tag's middle in the ideal image, and half its side there: the local coordinates.
-    origin: Vector2<f64>,
-    unit: f64,
+    local: Local,
     /// By rows; the last number is 1.
     cells_from_local: [f64; 9],
+    local_from_cells: Matrix3<f64>,
+    places: Places,
     /// Outer corners of the white margin: (0, 0), (10, 0), (10, 10), (0, 10) in cells.
     margin_px: [Point2<f64>; 4],
     middle_px: Point2<f64>,
@@ -233,21 +276,34 @@ struct View {
     side_px: f64,
 }
 
+/// The outer corners of the white margin.
+const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+
 impl View {
     fn new(camera: &Camera, ideal_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
-        /// The outer corners of the white margin.
-        const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
         let ideal = |[u, v]: [f64; 2]| {
             let p = ideal_from_cells * Vector3::new(u, v, 1.0);
             (p.z > 0.0).then(|| Vector2::new(p.x / p.z, p.y / p.z))
         };
-        let pixel = |cell: [f64; 2]| ideal(cell).map(|ideal| camera.pixel_of_ideal(ideal));
-        let [Some(a), Some(b), Some(c), Some(d)] = MARGIN.map(pixel) else { return Err(Refusal::Outside) };
-        let margin_px = [a, b, c, d];
+        let origin = ideal([MIDDLE, MIDDLE]).ok_or(Refusal::Outside)?;
+        let [Some(a), Some(b), Some(c), Some(d)] = MARGIN.map(ideal) else { return Err(Refusal::Outside) };
+        let unit = [a, b, c, d].into_iter().map(|end| (end - origin).norm()).fold(0.0, f64::max);
+        let local = Local::new(camera, origin, unit);
+        let (inv_unit, moved) = (1.0 / unit, -origin / unit);
+        let local_from_ideal = Matrix3::new(inv_unit, 0.0, moved.x, 0.0, inv_unit, moved.y, 0.0, 0.0, 1.0);
+        Self::within(camera, &local, &(local_from_ideal * ideal_from_cells))
+    }
+
+    /// A tag in local coordinates that are already there.
+    fn within(camera: &Camera, local: &Local, local_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+        let inverse = local_from_cells.try_inverse().ok_or(Refusal::Small)?;
+        let scale = 1.0 / inverse[(2, 2)];
+        let places = local.places(local_from_cells);
+        let margin_px = MARGIN.map(|[u, v]| places.pixel(u, v));
         if !margin_px.iter().all(|corner| camera.contains(corner)) {
             return Err(Refusal::Outside);
         }
-        let origin = ideal([MIDDLE, MIDDLE]).ok_or(Refusal::Outside)?;
+        let [a, b, c, d] = margin_px;
         let along_u = ((b - a) + (c - d)) / 20.0;
         let along_v = ((d - a) + (c - b)) / 20.0;
         let side_px = 8.0 * along_u.norm().min(along_v.norm());
@@ -255,29 +311,13 @@ impl View {
         if side_px < LEAST_SIDE_PX || area < 0.1 * along_u.norm() * along_v.norm() {
             return Err(Refusal::Small);
         }
-        let ends = MARGIN.map(ideal);
-        let reach = ends.into_iter().flatten().map(|end| (end - origin).norm()).fold(0.0, f64::max);
-        let local_from_ideal = Matrix3::new(
-            1.0 / reach,
-            0.0,
-            -origin.x / reach,
-            0.0,
-            1.0 / reach,
-            -origin.y / reach,
-            0.0,
-            0.0,
-            1.0,
-        );
-        let inverse = (local_from_ideal * ideal_from_cells).try_inverse().ok_or(Refusal::Small)?;
-        let scale = 1.0 / inverse[(2, 2)];
-        let cells_from_local = std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale);
         Ok(Self {
-            ideal_from_cells: *ideal_from_cells,
-            origin,
-            unit: reach,
-            cells_from_local,
+            local: *local,
+            cells_from_local: std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale),
+            local_from_cells: *local_from_cells,
+            places,
             margin_px,
-            middle_px: camera.pixel_of_ideal(origin),
+            middle_px: places.pixel(MIDDLE, MIDDLE),
             cells_per_px: [along_v.norm() / area, along_u.norm() / area],
             // The gradient of u stands across the lines of equal u, which run along v; and the other way round.
             correlation: -along_u.dot(&along_v) / (along_u.norm() * along_v.norm()),
@@ -287,35 +327,34 @@ impl View {
 
     /// The same tag moved in the image.
     fn shifted(&self, camera: &Camera, shift_px: Vector2<f64>) -> Result<Self, Refusal> {
-        if shift_px == Vector2::zeros() {
-            return Ok(*self);
-        }
-        let moved = camera.unproject(&(self.middle_px + shift_px)).xy() - self.origin;
-        let shift = Matrix3::new_translation(&moved);
-        Self::new(camera, &(shift * self.ideal_from_cells))
+        let by_px = self.local.px_by_local.try_inverse().ok_or(Refusal::Small)?;
+        let shift = Matrix3::new_translation(&(by_px * shift_px));
+        Self::within(camera, &self.local, &(shift * self.local_from_cells))
     }
 
     /// The tag as it was fitted in this view's local coordinates.
     fn fitted(&self, camera: &Camera, cells_from_local: &[f64; 9]) -> Result<Self, Refusal> {
-        let cells_from_local = Matrix3::from_row_slice(cells_from_local);
-        let ideal_from_local =
-            Matrix3::new(self.unit, 0.0, self.origin.x, 0.0, self.unit, self.origin.y, 0.0, 0.0, 1.0);
-        let mut ideal_from_cells =
-            ideal_from_local * cells_from_local.try_inverse().ok_or(Refusal::Misfit)?;
-        if ideal_from_cells[(2, 2)] < 0.0 {
-            ideal_from_cells = -ideal_from_cells;
-        }
-        Self::new(camera, &ideal_from_cells)
+        let inverse = Matrix3::from_row_slice(cells_from_local).try_inverse().ok_or(Refusal::Misfit)?;
+        Self::within(camera, &self.local, &inverse)
     }
 
-    /// The pixel of a cell coordinate, good to a fraction of a pixel: the margin's corners interpolated.
-    #[inline]
-    fn rough_px(&self, u: f64, v: f64) -> Point2<f64> {
-        let [a, b, c, d] = &self.margin_px;
-        let (s, t) = (u / 10.0, v / 10.0);
-        let upper = a.coords * (1.0 - s) + b.coords * s;
-        let lower = d.coords * (1.0 - s) + c.coords * s;
-        Point2::from(upper * (1.0 - t) + lower * t)
+    /// What pixels are picked from.
+    fn scene<'a>(&self, image: &'a GrayImage, pattern: &'a Pattern) -> Scene<'a> {
+        /// What lies beyond the margin by more than this is none of the tag's.
+        const SPARE_PX: f64 = 2.0;
+        let bound = |axis: usize, fold: fn(f64, f64) -> f64, start: f64| {
+            self.margin_px.iter().map(|corner| corner[axis]).fold(start, fold)
+        };
+        let low = [0, 1].map(|axis| (bound(axis, f64::min, f64::INFINITY) - SPARE_PX) as i32);
+        let high = [0, 1].map(|axis| (bound(axis, f64::max, 0.0) + SPARE_PX) as i32);
+        Scene {
+            image,
+            pattern,
+            places: self.places,
+            local: self.local,
+            bounds_px: [low, high],
+            cells_per_px: self.cells_per_px,
+        }
     }
 }
 
@@ -324,27 +363,32 @@ fn corners(camera: &Camera, view: &View, fit: &Fit) -> Option<([Point2<f64>; 4],
     let g = &fit.appearance.cells_from_local;
     let local_from_cells = Matrix3::from_row_slice(g).try_inverse()?;
     let mut corners_px = [Point2::origin(); 4];
-    let mut jacobian = SMatrix::<f64, 8, 8>::zeros();
+    let mut by_g = [[0.0; 8]; 8];
     for (k, [u, v]) in CORNERS.into_iter().enumerate() {
         let p = local_from_cells * Vector3::new(u, v, 1.0);
         let (x, y) = (p.x / p.z, p.y / p.z);
         let w = g[6] * x + g[7] * y + g[8];
-        // d(u, v) / d(x, y), and d(u, v) / dG: a change of G is made good by moving (x, y).
+        // d(u, v) / d(x, y), and d(u, v) / dG = (x, y, 1) for u and for v, −u (x, y) and −v (x, y) for the last two: a
+        // change of G is made good by moving (x, y).
         let by_local = Matrix2::new(g[0] - u * g[6], g[1] - u * g[7], g[3] - v * g[6], g[4] - v * g[7]) / w;
-        let by_g = SMatrix::<f64, 2, 8>::from_rows(&[
-            nalgebra::RowSVector::from([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y]),
-            nalgebra::RowSVector::from([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]),
-        ]) / w;
-        let ideal = view.origin + Vector2::new(x, y) * view.unit;
+        let ideal = view.local.origin + Vector2::new(x, y) * view.local.unit;
         let (pixel, by_ideal) = camera.pixel_of_ideal_with_jacobian(ideal);
         corners_px[k] = pixel;
-        let by_g = by_ideal * view.unit * (-by_local.try_inverse()? * by_g);
-        jacobian.fixed_view_mut::<2, 8>(2 * k, 0).copy_from(&by_g);
+        let by_cells = by_ideal * (-view.local.unit / w) * by_local.try_inverse()?;
+        for axis in 0..2 {
+            let (by_u, by_v) = (by_cells[(axis, 0)], by_cells[(axis, 1)]);
+            let by_w = -u * by_u - v * by_v;
+            let of_g = [by_u * x, by_u * y, by_u, by_v * x, by_v * y, by_v, by_w * x, by_w * y];
+            for (row, value) in by_g.iter_mut().zip(of_g) {
+                row[2 * k + axis] = value;
+            }
+        }
     }
-    let covariance = jacobian * fit.covariance * jacobian.transpose();
+    let covariance = fit.covariance(&by_g);
+    let covariance = CornerCovariance::from_fn(|i, j| covariance[i][j]);
     let sane = corners_px.iter().all(|corner| corner.coords.iter().all(|c| c.is_finite()))
         && covariance.iter().all(|number| number.is_finite());
-    sane.then_some((corners_px, (covariance + covariance.transpose()) * 0.5))
+    sane.then_some((corners_px, covariance))
 }
 
 #[cfg(test)]

@@ -18,18 +18,31 @@
 //! The covariance of G is the inverse of the normal matrix times the variance of the residuals (Triggs et al.,
 //! "Bundle adjustment: a modern synthesis", 1999, section 2).
 
+#![cfg_attr(
+    target_arch = "x86_64",
+    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
+)]
+
 mod lanes;
 
-use nalgebra::{SMatrix, SVector};
+pub use lanes::Pixels;
+use lanes::{Derivatives, KERNEL_VARIANCE, Picture};
 
-use super::pattern::Pattern;
-use lanes::{Derivatives, KERNEL_VARIANCE, LANES, Picture, Pixels};
+use wide::f32x8;
 
-/// Unknowns: eight of G, then β, γ, h_u, h_v.
+use super::START_BLUR_PX;
+use super::vector::{self, Vector};
+use crate::cholesky::{self, Cholesky};
+
+/// Unknowns: β, γ, h_u, h_v, then eight of G.
 const UNKNOWNS: usize = 12;
+/// The first that is one of G.
+const OF_G: usize = 4;
+/// The first that is one of the blur.
+const OF_BLUR: usize = 2;
 
-type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
-type Unknowns = SVector<f64, UNKNOWNS>;
+type Normal = [[f64; UNKNOWNS]; UNKNOWNS];
+type Unknowns = [f64; UNKNOWNS];
 
 /// What a tag looks like in one image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,20 +62,9 @@ pub struct Appearance {
 /// Pixels of a tag near its edges.
 #[derive(Debug, Default)]
 pub struct Samples {
-    /// The first `count` are pixels; what follows is room.
-    pixels: Vec<Pixel>,
-    count: usize,
-    lanes: Vec<Pixels>,
+    pixels: Vec<Pixels>,
+    count: f64,
     derivatives: Vec<Derivatives>,
-}
-
-/// One pixel: where it is in local coordinates, and the cell that it probably lies in. The fit may move it out of
-/// that cell by a fraction of its side.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pixel {
-    place: [f32; 2],
-    cell: [u8; 2],
-    grey: u8,
 }
 
 /// A fitted appearance.
@@ -72,16 +74,30 @@ pub struct Fit {
     pub appearance: Appearance,
     /// Standard deviation of the residuals, grey levels.
     pub noise: f64,
-    /// Covariance of the eight unknowns of G.
-    pub covariance: SMatrix<f64, 8, 8>,
+    /// The normal matrix of the last step, in units of the noise before it.
+    factor: Cholesky<UNKNOWNS>,
+    noise_before: f64,
 }
 
-/// Steps at most: two or three are usual.
-const MAX_STEPS: usize = 7;
-/// A step that moves no edge farther than this (cells) leaves an error of its square: a thousandth of a pixel.
-const SETTLED_CELLS: f64 = 0.02;
-/// The first steps take a part of the pixels.
-const COARSE_STRIDE: usize = 3;
+impl Fit {
+    /// Covariance of what depends on G, given its derivatives by the eight unknowns of G: a row for each of these.
+    pub fn covariance(&self, derivatives: &[[f64; 8]; 8]) -> [[f64; 8]; 8] {
+        let mut rows = [[0.0; 8]; UNKNOWNS];
+        rows[OF_G..].copy_from_slice(derivatives);
+        let shrunk = (self.noise / self.noise_before).powi(2);
+        cholesky::products(&self.factor.whitened(rows)).map(|row| row.map(|value| value * shrunk))
+    }
+}
+
+/// How closely to fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Closeness {
+    /// Steps at most.
+    pub most_steps: usize,
+    /// A step that moves no edge farther than this needs no other.
+    pub settled_px: f64,
+}
+
 /// Blur beyond one cell is not a tag any more.
 const BLUR_RANGE: [f64; 2] = [0.05, 1.0];
 /// How far the blur departs from what it was, as a share: it is known from other tags and images.
@@ -92,81 +108,70 @@ const LEAST_NOISE: f64 = 0.3;
 impl Samples {
     /// Forgets all pixels.
     pub fn clear(&mut self) {
-        self.count = 0;
+        self.pixels.clear();
+        self.count = 0.0;
     }
 
-    /// Adds a pixel, if it is to be kept.
-    #[inline]
-    pub fn push(&mut self, place: [f32; 2], cell: [usize; 2], grey: u8, keep: bool) {
-        if self.count == self.pixels.len() {
-            self.pixels.resize(2 * self.count + 64, Pixel::default());
+    /// Adds eight pixels.
+    #[inline(always)]
+    pub fn push(&mut self, pixels: Pixels) {
+        self.count += f64::from(pixels.weight.iter().sum::<f32>());
+        self.pixels.push(pixels);
+    }
+
+    /// Fits from a start that is right within half the reach of the blur; `None` where it leads nowhere. `known` has
+    /// the blur that is believed beforehand.
+    pub fn fit(&mut self, start: &Appearance, known: &Appearance, closeness: &Closeness) -> Option<Fit> {
+        #[cfg(target_arch = "x86_64")]
+        if vector::has_avx2() {
+            // SAFETY: the processor has what it is compiled for.
+            return unsafe { self.fit_avx2(start, known, closeness) };
         }
-        self.pixels[self.count] = Pixel { place, cell: cell.map(|index| index as u8), grey };
-        self.count += usize::from(keep);
+        self.fit_with::<f32x8>(start, known, closeness)
     }
 
-    /// Gets ready for the fit, after the last pixel.
-    pub fn complete(&mut self, pattern: &Pattern) {
-        self.lanes.clear();
-        for pixels in self.pixels[..self.count].chunks(LANES) {
-            let mut lanes = Pixels::default();
-            for (lane, pixel) in pixels.iter().enumerate() {
-                let [column, row] = pixel.cell;
-                lanes.x[lane] = pixel.place[0];
-                lanes.y[lane] = pixel.place[1];
-                lanes.column[lane] = f32::from(column);
-                lanes.row[lane] = f32::from(row);
-                lanes.grey[lane] = f32::from(pixel.grey);
-                lanes.weight[lane] = 1.0;
-                let cells = pattern.around(usize::from(column), usize::from(row));
-                for (all, cell) in lanes.cells.iter_mut().zip(cells) {
-                    all[lane] = cell;
-                }
-            }
-            self.lanes.push(lanes);
-        }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn fit_avx2(&mut self, start: &Appearance, known: &Appearance, closeness: &Closeness) -> Option<Fit> {
+        self.fit_with::<vector::Avx>(start, known, closeness)
     }
 
-    /// Number of pixels.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// Fits from a start that is right within half the reach of the blur; `None` where it leads nowhere.
-    pub fn fit(&mut self, start: &Appearance) -> Option<Fit> {
-        if self.len() < 4 * UNKNOWNS {
+    #[inline(always)]
+    fn fit_with<V: Vector>(
+        &mut self,
+        start: &Appearance,
+        known: &Appearance,
+        closeness: &Closeness,
+    ) -> Option<Fit> {
+        let freedom = self.count - UNKNOWNS as f64;
+        if freedom < UNKNOWNS as f64 {
             return None;
         }
         let mut appearance = *start;
-        let mut noise = f64::INFINITY;
-        let mut normal = Normal::zeros();
-        let mut stride = COARSE_STRIDE;
-        for _ in 0..MAX_STEPS {
-            let products = self.linearize(&appearance, stride);
+        let cells_per_px = known.blur_cells[0].min(known.blur_cells[1]) / START_BLUR_PX;
+        for _ in 0..closeness.most_steps {
+            let products = self.linearize::<V>(&appearance);
             let squares = f64::from(products[UNKNOWNS][UNKNOWNS]);
-            let freedom = (self.len() as f64 / stride as f64 - UNKNOWNS as f64).max(1.0);
-            noise = (squares / freedom).sqrt().max(LEAST_NOISE);
-            let gradient;
-            (normal, gradient) = normal_equations(&products, noise, &appearance, start);
-            let change = normal.cholesky()?.solve(&gradient);
+            let noise = (squares / freedom).sqrt().max(LEAST_NOISE);
+            let (normal, gradient) = normal_equations(&products, noise, &appearance, known);
+            let factor = Cholesky::new(normal)?;
+            let change = factor.solve(&gradient);
             appearance = appearance.changed(&change)?;
-            let settled = change_cells(&change) < SETTLED_CELLS;
-            if settled && stride == 1 {
-                break;
-            }
-            if settled {
-                stride = 1;
+            if change_cells(&change) < closeness.settled_px * cells_per_px {
+                // What the step promises to take off the residuals.
+                let promise: f64 = change.iter().zip(&gradient).map(|(a, b)| a * b).sum();
+                let left = (squares - promise * noise * noise).max(0.0);
+                let noise_before = noise;
+                let noise = (left / freedom).sqrt().max(LEAST_NOISE);
+                return Some(Fit { appearance, noise, factor, noise_before });
             }
         }
-        if stride > 1 {
-            return None;
-        }
-        let covariance = normal.cholesky()?.inverse().fixed_view::<8, 8>(0, 0).into_owned();
-        Some(Fit { appearance, noise, covariance })
+        None
     }
 
-    /// Products of derivatives and residuals at an appearance, summed over every `stride`-th eight of pixels.
-    fn linearize(&mut self, appearance: &Appearance, stride: usize) -> lanes::Products {
+    /// Products of derivatives and residuals at an appearance, summed over the pixels.
+    #[inline(always)]
+    fn linearize<V: Vector>(&mut self, appearance: &Appearance) -> lanes::Products {
         let [h_u, h_v] = appearance.blur_cells;
         let picture = Picture {
             cells_from_local: appearance.cells_from_local.map(|value| value as f32),
@@ -175,11 +180,12 @@ impl Samples {
             inv_blur: [1.0 / h_u as f32, 1.0 / h_v as f32],
             mixed: (appearance.correlation * h_u * h_v * KERNEL_VARIANCE) as f32,
         };
-        lanes::products(&self.lanes, stride, &picture, &mut self.derivatives)
+        lanes::products::<V>(&self.pixels, &picture, &mut self.derivatives)
     }
 }
 
 /// The normal equations in units of the noise, with what is known of the blur.
+#[inline(always)]
 fn normal_equations(
     products: &lanes::Products,
     noise: f64,
@@ -187,36 +193,48 @@ fn normal_equations(
     known: &Appearance,
 ) -> (Normal, Unknowns) {
     let weight = 1.0 / (noise * noise);
-    let mut normal = Normal::from_fn(|i, j| weight * f64::from(products[i][j]));
-    let mut gradient = Unknowns::from_fn(|i, _| weight * f64::from(products[UNKNOWNS][i]));
+    let mut normal = [[0.0; UNKNOWNS]; UNKNOWNS];
+    let mut gradient = [0.0; UNKNOWNS];
+    for (i, row) in normal.iter_mut().enumerate() {
+        for (value, product) in row.iter_mut().zip(&products[i]) {
+            *value = weight * f64::from(*product);
+        }
+        gradient[i] = weight * f64::from(products[UNKNOWNS][i]);
+    }
     for axis in 0..2 {
-        let at = UNKNOWNS - 2 + axis;
+        let at = OF_BLUR + axis;
         let prior = 1.0 / (BLUR_SHARE * known.blur_cells[axis]).powi(2);
-        normal[(at, at)] += prior;
+        normal[at][at] += prior;
         gradient[at] += prior * (known.blur_cells[axis] - now.blur_cells[axis]);
     }
     (normal, gradient)
 }
 
 impl Appearance {
+    /// The blur in units of another's, along the side where it has grown most.
+    pub fn blur_over(&self, other: &Self) -> f64 {
+        let ratio = |axis: usize| self.blur_cells[axis] / other.blur_cells[axis];
+        ratio(0).max(ratio(1))
+    }
+
     /// With all unknowns changed; `None` if it is no picture of a tag any more.
     fn changed(&self, change: &Unknowns) -> Option<Self> {
         if !change.iter().all(|number| number.is_finite()) {
             return None;
         }
         let mut cells_from_local = self.cells_from_local;
-        for (value, change) in cells_from_local.iter_mut().zip(change.iter().take(8)) {
+        for (value, change) in cells_from_local.iter_mut().zip(&change[OF_G..]) {
             *value += change;
         }
         let blur = |axis: usize| {
             // No step changes the blur by more than half: it is known less well than the edges.
             let h = self.blur_cells[axis];
-            (h + change[10 + axis].clamp(-0.5 * h, 0.5 * h)).clamp(BLUR_RANGE[0], BLUR_RANGE[1])
+            (h + change[OF_BLUR + axis].clamp(-0.5 * h, 0.5 * h)).clamp(BLUR_RANGE[0], BLUR_RANGE[1])
         };
-        let contrast = self.contrast + change[9];
+        let contrast = self.contrast + change[1];
         (contrast > 0.0).then(|| Self {
             cells_from_local,
-            black: self.black + change[8],
+            black: self.black + change[0],
             contrast,
             blur_cells: [blur(0), blur(1)],
             correlation: self.correlation,
@@ -228,6 +246,6 @@ impl Appearance {
 fn change_cells(change: &Unknowns) -> f64 {
     /// (u, v) at the square's end is this far from zero.
     const FAR: f64 = 9.0;
-    let axis = |first: usize| change.fixed_rows::<3>(first).abs().sum();
-    axis(0).max(axis(3)) + FAR * change.fixed_rows::<2>(6).abs().sum()
+    let sum = |range: std::ops::Range<usize>| -> f64 { change[range].iter().map(|value| value.abs()).sum() };
+    sum(OF_G..OF_G + 3).max(sum(OF_G + 3..OF_G + 6)) + FAR * sum(OF_G + 6..UNKNOWNS)
 }

@@ -5,6 +5,7 @@
 
 use nalgebra::Point2;
 
+use super::vector::{LANES, Vector};
 use crate::camera::Camera;
 
 /// Distance of the nodes, pixels.
@@ -30,42 +31,43 @@ impl RayGrid {
         Self { columns, nodes: (0..columns * rows).map(node).collect() }
     }
 
-    /// The rays of one row of the image.
-    pub fn row(&self, y: usize) -> RayRow<'_> {
-        let first = y / STEP * self.columns;
-        RayRow {
-            above: &self.nodes[first..first + self.columns],
-            below: &self.nodes[first + self.columns..first + 2 * self.columns],
-            share: (y % STEP) as f32 / STEP as f32,
+    /// The rays of eight pixels of the image.
+    #[inline(always)]
+    pub fn at<V: Vector>(&self, x: V, y: V) -> [V; 2] {
+        let per_step = V::splat(1.0 / STEP as f32);
+        let (x, y) = (x * per_step, y * per_step);
+        let (left, upper) = (x.floor(), y.floor());
+        let (columns, rows) = (left.whole(), upper.whole());
+        // The nodes round each pixel: x and y of the upper left one, the upper right one, …
+        let mut nodes = [[0.0; LANES]; 8];
+        for lane in 0..LANES {
+            let first = rows[lane] as usize * self.columns + columns[lane] as usize;
+            let above = &self.nodes[first..first + 2];
+            let below = &self.nodes[first + self.columns..first + self.columns + 2];
+            [nodes[0][lane], nodes[1][lane]] = above[0];
+            [nodes[2][lane], nodes[3][lane]] = above[1];
+            [nodes[4][lane], nodes[5][lane]] = below[0];
+            [nodes[6][lane], nodes[7][lane]] = below[1];
         }
+        let (share_x, share_y) = (x - left, y - upper);
+        let [ax, ay, bx, by, cx, cy, dx, dy] = nodes;
+        [between([ax, bx, cx, dx], share_x, share_y), between([ay, by, cy, dy], share_x, share_y)]
     }
 }
 
-/// Rays of one row of pixels.
-#[derive(Debug, Clone, Copy)]
-pub struct RayRow<'a> {
-    above: &'a [[f32; 2]],
-    below: &'a [[f32; 2]],
-    share: f32,
-}
-
-impl RayRow<'_> {
-    /// The ray of a pixel of the row.
-    #[inline]
-    pub fn at(&self, x: usize) -> [f32; 2] {
-        let (left, share) = (x / STEP, (x % STEP) as f32 / STEP as f32);
-        let (a, b) = (self.above[left], self.above[left + 1]);
-        let (c, d) = (self.below[left], self.below[left + 1]);
-        std::array::from_fn(|axis| {
-            let upper = a[axis] + share * (b[axis] - a[axis]);
-            let lower = c[axis] + share * (d[axis] - c[axis]);
-            upper + self.share * (lower - upper)
-        })
-    }
+/// Between the upper left, upper right, lower left and lower right.
+#[inline(always)]
+fn between<V: Vector>([a, b, c, d]: [[f32; LANES]; 4], share_x: V, share_y: V) -> V {
+    let (a, c) = (V::new(a), V::new(c));
+    let upper = share_x.times_plus(V::new(b) - a, a);
+    let lower = share_x.times_plus(V::new(d) - c, c);
+    share_y.times_plus(lower - upper, upper)
 }
 
 #[cfg(test)]
 mod tests {
+    use wide::f32x8;
+
     use super::*;
     use crate::testing;
 
@@ -77,9 +79,10 @@ mod tests {
         let sut = RayGrid::new(camera);
         for y in [0, 1, 357, 719] {
             for x in (0..1280).step_by(7) {
-                let ray = sut.row(y).at(x);
-                let exact = camera.unproject(&Point2::new(x as f64, y as f64));
-                let error = (f64::from(ray[0]) - exact.x).hypot(f64::from(ray[1]) - exact.y);
+                let ray = sut.at(f32x8::splat(x as f32), f32x8::splat(y as f32));
+                let ray = ray.map(|all| f64::from(all.to_array()[0]));
+                let exact = camera.unproject(&Point2::new(f64::from(x), f64::from(y)));
+                let error = (ray[0] - exact.x).hypot(ray[1] - exact.y);
                 assert!(error * camera.focal_px.x < TOLERANCE_PX, "{error}");
             }
         }

@@ -1,105 +1,171 @@
 //! Picks the pixels of a tag that say where its edges are.
 //!
-//! Of a small tag all pixels near an edge are taken; of a larger one an even lattice of them, so that reading a
-//! tag takes about the same time whatever its size.
+//! They lie where the grey level changes most: beside the edges, no farther than the blur reaches. As many are picked
+//! of each tag, evenly along all its edges, so that reading a tag takes about the same time whatever its size.
 
-use super::View;
-use super::fit::{Appearance, Samples};
+#![cfg_attr(
+    target_arch = "x86_64",
+    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
+)]
+
+use wide::f32x8;
+
+use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
+use super::places::{self, Local, Places};
 use super::rays::RayGrid;
+use super::vector::{self, LANES, Vector};
 use crate::image::GrayImage;
 
-/// Pixels that are taken of a tag, about.
-const WANTED: f64 = 640.0;
-/// Length of the edges of a tag, in sides: 32 cells' sides outside, about 40 inside.
-const EDGES: f64 = 9.0;
-/// Pixels beside an edge are taken up to this many pixels farther than the blur reaches, for what the alignment
-/// left.
-const SPARE_PX: f64 = 0.5;
 /// Not so close to the end of the white margin, cells: what lies beyond is unknown.
 const BORDER: f32 = 0.35;
-/// From one row of the lattice to the next, in its steps: near the golden ratio, which spreads evenly.
-const SLANT: f64 = 0.382;
 
-/// Collects pixels near the edges.
-pub fn collect(
-    image: &GrayImage,
-    pattern: &Pattern,
-    view: &View,
+/// How many pixels to pick, and how far beside the edges.
+#[derive(Debug, Clone, Copy)]
+pub struct Choice {
+    /// Every so many of the pattern's eights of spots.
+    pub stride: usize,
+    /// Share of the blur's half-width,
+    pub blur_share: f64,
+    /// and pixels more, for what is not known yet of where the edges are.
+    pub spare_px: f64,
+    /// How often each spot is used, each time at another distance from its edge.
+    pub turns: usize,
+}
+
+/// Notes which pixels were picked, so that none counts twice.
+#[derive(Debug, Default)]
+pub struct Picked {
+    words: Vec<u64>,
+    words_a_row: usize,
+    first: [i32; 2],
+}
+
+/// A tag in an image.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// The image.
+    pub image: &'a GrayImage,
+    /// The tag.
+    pub pattern: &'a Pattern,
+    /// Where its cells lie in the image, roughly.
+    pub places: Places,
+    /// Its local coordinates.
+    pub local: Local,
+    /// Rectangle of pixels that holds it: first and last.
+    pub bounds_px: [[i32; 2]; 2],
+    /// Length of the gradients of u and v in the image.
+    pub cells_per_px: [f64; 2],
+}
+
+impl Picked {
+    fn clear(&mut self, [first, last]: [[i32; 2]; 2]) {
+        self.first = first;
+        self.words_a_row = (last[0] - first[0]).max(0) as usize / 64 + 1;
+        self.words.clear();
+        self.words.resize(self.words_a_row * ((last[1] - first[1]).max(0) as usize + 1), 0);
+    }
+
+    /// Whether a pixel is picked for the first time; `false` outside the bounds.
+    #[inline(always)]
+    fn first_time(&mut self, x: i32, y: i32) -> bool {
+        let (x, y) = (x.wrapping_sub(self.first[0]) as usize, y.wrapping_sub(self.first[1]) as usize);
+        let bit = 1 << (x % 64);
+        match self.words.get_mut(y.wrapping_mul(self.words_a_row).wrapping_add(x / 64)) {
+            Some(word) => {
+                let new = *word & bit == 0;
+                *word |= bit;
+                new
+            }
+            None => false,
+        }
+    }
+}
+
+/// Picks pixels.
+pub fn pick(
+    scene: &Scene<'_>,
     rays: &RayGrid,
     appearance: &Appearance,
+    choice: &Choice,
+    picked: &mut Picked,
     samples: &mut Samples,
 ) {
+    picked.clear(scene.bounds_px);
     samples.clear();
-    let g = appearance.cells_from_local.map(|value| value as f32);
-    let reach = |axis: usize| appearance.blur_cells[axis] + SPARE_PX * view.cells_per_px[axis];
-    let (reach_u, reach_v) = (reach(0) as f32, reach(1) as f32);
-    let (inv_unit, origin) = ((1.0 / view.unit) as f32, view.origin.cast::<f32>());
-
-    let band_px = 2.0 * reach(0) / view.cells_per_px[0];
-    let near_px2 = (EDGES * view.side_px * band_px).min((1.2 * view.side_px).powi(2));
-    let step = ((near_px2 / WANTED) as usize).max(1);
-    let slant = ((SLANT * step as f64).round() as usize).max(1);
-
-    let outline = Outline::new(view);
-    let last = CELLS as f32 - BORDER;
-    for y in outline.rows(image.height() as usize) {
-        let columns = outline.columns(y, image.width() as usize);
-        // The lattice is fixed to the image: which pixels are taken does not depend on the guess.
-        let phase = (y * slant) % step;
-        let first = columns.start + (step + phase - columns.start % step) % step;
-        let pixels = &image.data()[y * image.width() as usize..][..columns.end];
-        let line = rays.row(y);
-        for (x_px, grey) in pixels.iter().enumerate().skip(first).step_by(step) {
-            let ray = line.at(x_px);
-            let (x, y) = ((ray[0] - origin.x) * inv_unit, (ray[1] - origin.y) * inv_unit);
-            let inv_w = 1.0 / (g[6] * x + g[7] * y + g[8]);
-            let u = (g[0] * x + g[1] * y + g[2]) * inv_w;
-            let v = (g[3] * x + g[4] * y + g[5]) * inv_w;
-            // Casts of negative numbers saturate at zero.
-            let (column, row) = ((u as usize).min(CELLS - 1), (v as usize).min(CELLS - 1));
-            let (fu, fv) = (u - column as f32, v - row as f32);
-            let [left, right, above, below] = pattern.steps(column, row);
-            // Without branches: which pixels are near an edge cannot be foreseen.
-            let inside = (u > BORDER) & (u < last) & (v > BORDER) & (v < last);
-            let near = (left & (fu < reach_u))
-                | (right & (1.0 - fu < reach_u))
-                | (above & (fv < reach_v))
-                | (below & (1.0 - fv < reach_v));
-            samples.push([x, y], [column, row], *grey, inside & near);
-        }
+    #[cfg(target_arch = "x86_64")]
+    if vector::has_avx2() {
+        // SAFETY: the processor has what it is compiled for.
+        return unsafe { pick_avx2(scene, rays, appearance, choice, picked, samples) };
     }
-    samples.complete(pattern);
+    pick_with::<f32x8>(scene, rays, appearance, choice, picked, samples);
 }
 
-/// The quadrilateral of the white margin.
-struct Outline {
-    corners: [[f64; 2]; 4],
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn pick_avx2(
+    scene: &Scene<'_>,
+    rays: &RayGrid,
+    appearance: &Appearance,
+    choice: &Choice,
+    picked: &mut Picked,
+    samples: &mut Samples,
+) {
+    pick_with::<vector::Avx>(scene, rays, appearance, choice, picked, samples);
 }
 
-impl Outline {
-    fn new(view: &View) -> Self {
-        Self { corners: view.margin_px.map(|corner| [corner.x, corner.y]) }
-    }
-
-    fn rows(&self, height: usize) -> std::ops::Range<usize> {
-        let low = self.corners.iter().map(|c| c[1]).fold(f64::INFINITY, f64::min);
-        let high = self.corners.iter().map(|c| c[1]).fold(0.0, f64::max);
-        (low.ceil().max(0.0) as usize)..(high as usize + 1).min(height)
-    }
-
-    /// The columns inside it in a row.
-    fn columns(&self, row: usize, width: usize) -> std::ops::Range<usize> {
-        let y = row as f64;
-        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
-        for k in 0..4 {
-            let (a, b) = (self.corners[k], self.corners[(k + 1) % 4]);
-            if (a[1] <= y) != (b[1] <= y) {
-                let x = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
-                low = low.min(x);
-                high = high.max(x);
-            }
+#[inline(always)]
+fn pick_with<V: Vector>(
+    scene: &Scene<'_>,
+    rays: &RayGrid,
+    appearance: &Appearance,
+    choice: &Choice,
+    picked: &mut Picked,
+    samples: &mut Samples,
+) {
+    let reach: [f32; 2] = std::array::from_fn(|axis| {
+        let blur = choice.blur_share * appearance.blur_cells[axis];
+        (blur + choice.spare_px * scene.cells_per_px[axis]) as f32
+    });
+    let (reach_u, reach_v) = (V::splat(reach[0]), V::splat(reach[1]));
+    let cells_from_local = appearance.cells_from_local.map(|value| value as f32);
+    let inv_unit = V::splat((1.0 / scene.local.unit) as f32);
+    let origin_x = V::splat(scene.local.origin.x as f32);
+    let origin_y = V::splat(scene.local.origin.y as f32);
+    let end = CELLS as f32 - BORDER;
+    let image = scene.image;
+    let width = image.width() as i32;
+    let turns = (0..choice.turns).map(|turn| turn as f32 / choice.turns as f32);
+    let all = turns.flat_map(|turn| scene.pattern.spots(choice.stride).map(move |spots| (turn, spots)));
+    for (turn, spots) in all {
+        // From −1 to 1, and on from −1.
+        let share = V::new(spots.aside) + V::splat(turn);
+        let aside = (share - share.floor()).times_plus(V::splat(2.0), V::splat(-1.0));
+        let u = (aside * reach_u).times_plus(V::new(spots.normal_u), V::new(spots.u));
+        let v = (aside * reach_v).times_plus(V::new(spots.normal_v), V::new(spots.v));
+        let [x, y] = scene.places.pixels(u, v);
+        let (x, y) = (places::nearest(x, image.width()), places::nearest(y, image.height()));
+        let (columns, rows) = (x.whole(), y.whole());
+        let mut pixels = Pixels::default();
+        for lane in 0..LANES {
+            let (x, y) = (columns[lane], rows[lane]);
+            pixels.grey[lane] = f32::from(image.data()[(y * width + x) as usize]);
+            pixels.weight[lane] = if picked.first_time(x, y) { 1.0 } else { 0.0 };
         }
-        (low.max(0.0) as usize).min(width)..(high as usize + 1).min(width)
+        let [ray_x, ray_y] = rays.at(x, y);
+        let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
+        let (u, v) = places::mapped(&cells_from_local, x, y);
+        let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
+        pixels.weight = (V::new(pixels.weight) * inside).to_array();
+        let (column, row) = (u.bounded(BORDER, end).floor(), v.bounded(BORDER, end).floor());
+        let cells = row.times_plus(V::splat(CELLS as f32), column).whole();
+        pixels.x = x.to_array();
+        pixels.y = y.to_array();
+        pixels.column = column.to_array();
+        pixels.row = row.to_array();
+        for lane in 0..LANES {
+            pixels.around[lane] = i32::from(scene.pattern.around(cells[lane] as usize));
+        }
+        samples.push(pixels);
     }
 }

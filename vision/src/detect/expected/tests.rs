@@ -30,6 +30,7 @@ fn picture(side_px: f64, tilt_rad: f64, number: u64) -> TagPicture {
         size_m,
         id: 5 + number as u32 % 500,
         blur_px: 0.7,
+        motion_px: 0.0,
         noise_levels: 2.0,
     }
 }
@@ -46,17 +47,21 @@ struct Outcome {
     rms_px: f64,
     /// Squared error by the stated covariance, per coordinate.
     normalized: f64,
+    refused: u64,
 }
 
-fn measure(side_px: f64, tilt_deg: f64, count: u64) -> Outcome {
-    let (mut squares, mut normalized) = (0.0, 0.0);
+fn measure(side_px: f64, tilt_deg: f64, motion_px: f64, count: u64) -> Outcome {
+    let (mut squares, mut normalized, mut refused) = (0.0, 0.0, 0);
     for number in 0..count {
-        let picture = picture(side_px, tilt_deg.to_radians(), 1 + number);
+        let picture = TagPicture { motion_px, ..picture(side_px, tilt_deg.to_radians(), 1 + number) };
         let image = picture.render(1000 + number);
         let mut sut = Reader::new(&picture.camera, &[picture.id]);
         let mut noise = Noise(77 + number);
         let off = [2.0 * noise.uniform() - 1.0, 2.0 * noise.uniform() - 1.0];
-        let reading = sut.read(&image, &expectation(&picture, off, 3.0)).expect("it is there");
+        let Ok(reading) = sut.read(&image, &expectation(&picture, off, 3.0)) else {
+            refused += 1;
+            continue;
+        };
         let mut error = nalgebra::SVector::<f64, 8>::zeros();
         for (k, (found, truth)) in reading.corners_px.iter().zip(picture.corners_px()).enumerate() {
             error.fixed_rows_mut::<2>(2 * k).copy_from(&(found - truth));
@@ -65,17 +70,27 @@ fn measure(side_px: f64, tilt_deg: f64, count: u64) -> Outcome {
         let weight = reading.covariance_px2.try_inverse().expect("regular");
         normalized += error.dot(&(weight * error)) / 8.0;
     }
-    Outcome { rms_px: (squares / count as f64).sqrt(), normalized: normalized / count as f64 }
+    let read = (count - refused) as f64;
+    Outcome { rms_px: (squares / read).sqrt(), normalized: normalized / read, refused }
 }
 
 #[test]
 fn corners_are_right_within_a_hundredth_of_a_pixel() {
     // Side, bound of the RMS error per axis. `eval vision` has more of them, and the library beside.
     for (side_px, bound_px) in [(20.0, 0.05), (40.0, 0.010), (60.0, 0.010)] {
-        let Outcome { rms_px, normalized } = measure(side_px, 20.0, 8);
+        let Outcome { rms_px, normalized, refused } = measure(side_px, 20.0, 0.0, 8);
+        assert_eq!(refused, 0, "side {side_px} px");
         assert!(rms_px < bound_px, "side {side_px} px: {rms_px} px");
         assert!((0.6..1.7).contains(&normalized), "side {side_px} px: {normalized}");
     }
+}
+
+#[test]
+fn corners_of_a_tag_that_moves_while_it_is_exposed_are_right_within_a_fifth_of_a_pixel() {
+    // Eight pixels are as much as a cell: its edges flow into each other.
+    let Outcome { rms_px, refused, .. } = measure(64.0, 20.0, 8.0, 6);
+    assert_eq!(refused, 0);
+    assert!(rms_px < 0.2, "{rms_px} px");
 }
 
 #[test]
@@ -118,7 +133,9 @@ fn corners_found_by_a_search_are_as_good_a_start_as_a_pose() {
     let found = picture.corners_px().map(|corner| corner + Vector2::new(0.2, -0.15));
     let start = Expectation::from_corners(picture.id, &picture.camera, &found, 2.0).expect("a square");
     let from_corners = sut.read(&image, &start).expect("there");
-    for (a, b) in from_pose.corners_px.iter().zip(&from_corners.corners_px) {
-        assert!((a - b).norm() < 3e-3, "{a} {b}");
+    // Which pixels are picked depends a little on the start: by less than half of what noise does.
+    for (k, (a, b)) in from_pose.corners_px.iter().zip(&from_corners.corners_px).enumerate() {
+        let variance = from_pose.covariance_px2.fixed_view::<2, 2>(2 * k, 2 * k).trace();
+        assert!((a - b).norm() < 0.5 * variance.sqrt(), "{a} {b}");
     }
 }

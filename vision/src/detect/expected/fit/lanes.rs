@@ -1,17 +1,8 @@
-//! The fit's inner loops, eight pixels side by side, so that the compiler makes vectors of them; compiled a second
-//! time for processors with AVX2, which halves the time.
-
-#![cfg_attr(
-    target_arch = "x86_64",
-    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
-)]
-
-use wide::f32x8;
+//! The fit's inner loops, eight pixels side by side.
 
 use super::UNKNOWNS;
-
-/// Pixels side by side.
-pub const LANES: usize = 8;
+use crate::detect::expected::places::plane;
+use crate::detect::expected::vector::{LANES, Vector};
 
 type Lanes = [f32; LANES];
 
@@ -30,8 +21,8 @@ pub struct Pixels {
     pub column: Lanes,
     /// See [`Pixels::column`].
     pub row: Lanes,
-    /// That cell and its neighbours, 1 white, 0 black: row by row from the top left.
-    pub cells: [Lanes; 9],
+    /// Colours of that cell and its neighbours: [`super::super::pattern::Pattern::around`].
+    pub around: [i32; LANES],
     /// What was seen.
     pub grey: Lanes,
     /// 0 where there is no pixel, else 1.
@@ -63,127 +54,74 @@ pub struct Picture {
     pub mixed: f32,
 }
 
-/// Products of derivatives and residuals, summed over every `stride`-th eight of pixels; `scratch` is kept for the
-/// next time.
-pub fn products(
-    pixels: &[Pixels],
-    stride: usize,
-    picture: &Picture,
-    scratch: &mut Vec<Derivatives>,
-) -> Products {
-    scratch.resize(pixels.len().div_ceil(stride), [[0.0; LANES]; COUNT]);
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        // SAFETY: the processor has both.
-        return unsafe {
-            avx2::derive(pixels, stride, picture, scratch);
-            avx2::products(scratch)
-        };
-    }
-    derive(pixels, stride, picture, scratch);
-    sum_products(scratch)
-}
-
-/// The same for processors with AVX2.
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use std::arch::x86_64::{__m256, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_setzero_ps, _mm256_storeu_ps};
-
-    use super::{COUNT, Derivatives, LANES, Lanes, Picture, Pixels, Products};
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn derive(pixels: &[Pixels], stride: usize, picture: &Picture, out: &mut [Derivatives]) {
-        super::derive(pixels, stride, picture, out);
-    }
-
-    /// Four sums at a time: as many as hide how long an addition takes.
-    #[target_feature(enable = "avx2,fma")]
-    pub fn products(derivatives: &[Derivatives]) -> Products {
-        let mut products = [[0.0; COUNT]; COUNT];
-        for i in 0..COUNT {
-            for j in (0..=i).step_by(4) {
-                let others = [j, j + 1, j + 2, j + 3].map(|k| k.min(i));
-                let mut sums = [_mm256_setzero_ps(); 4];
-                for all in derivatives {
-                    let own = load(&all[i]);
-                    for (sum, k) in sums.iter_mut().zip(others) {
-                        *sum = _mm256_fmadd_ps(own, load(&all[k]), *sum);
-                    }
-                }
-                for (sum, k) in sums.into_iter().zip(others) {
-                    let mut lanes: Lanes = [0.0; LANES];
-                    // SAFETY: the array holds the eight numbers that are written.
-                    unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), sum) };
-                    let value = super::sum(&lanes);
-                    products[i][k] = value;
-                    products[k][i] = value;
-                }
-            }
-        }
-        products
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2,fma")]
-    fn load(lanes: &Lanes) -> __m256 {
-        // SAFETY: the array holds the eight numbers that are read.
-        unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
-    }
+/// Products of derivatives and residuals, summed over the pixels; `scratch` is kept for the next time.
+#[inline(always)]
+pub fn products<V: Vector>(pixels: &[Pixels], picture: &Picture, scratch: &mut Vec<Derivatives>) -> Products {
+    scratch.resize(pixels.len(), [[0.0; LANES]; COUNT]);
+    derive::<V>(pixels, picture, scratch);
+    sum_products::<V>(scratch)
 }
 
 /// Derivatives and residuals.
 #[inline(always)]
-fn derive(pixels: &[Pixels], stride: usize, picture: &Picture, out: &mut [Derivatives]) {
-    let g = picture.cells_from_local.map(f32x8::splat);
-    let [black, contrast, mixed] = [picture.black, picture.contrast, picture.mixed].map(f32x8::splat);
-    let [inv_blur_u, inv_blur_v] = picture.inv_blur.map(f32x8::splat);
-    for (pixels, out) in pixels.iter().step_by(stride).zip(out) {
-        let (x, y) = (f32x8::new(pixels.x), f32x8::new(pixels.y));
-        let weight = f32x8::new(pixels.weight);
-        let inv_w = f32x8::ONE / (g[6] * x + g[7] * y + g[8]);
-        let u = (g[0] * x + g[1] * y + g[2]) * inv_w;
-        let v = (g[3] * x + g[4] * y + g[5]) * inv_w;
-        let across = Weights::new(u - f32x8::new(pixels.column), inv_blur_u);
-        let down = Weights::new(v - f32x8::new(pixels.row), inv_blur_v);
-        let cells = pixels.cells.map(f32x8::new);
+fn derive<V: Vector>(pixels: &[Pixels], picture: &Picture, out: &mut [Derivatives]) {
+    let g = &picture.cells_from_local;
+    let (black, contrast, mixed) =
+        (V::splat(picture.black), V::splat(picture.contrast), V::splat(picture.mixed));
+    let (inv_blur_u, inv_blur_v) = (V::splat(picture.inv_blur[0]), V::splat(picture.inv_blur[1]));
+    for (pixels, out) in pixels.iter().zip(out) {
+        let (x, y) = (V::new(pixels.x), V::new(pixels.y));
+        let weight = V::new(pixels.weight);
+        let inv_w = V::splat(1.0) / plane(g[6], g[7], g[8], x, y);
+        let u = plane(g[0], g[1], g[2], x, y) * inv_w;
+        let v = plane(g[3], g[4], g[5], x, y) * inv_w;
+        let across = Weights::new(u - V::new(pixels.column), inv_blur_u);
+        let down = Weights::new(v - V::new(pixels.row), inv_blur_v);
+        let cells = Row::of_cells(&pixels.around);
         let [t, t_u, t_v, t_hu, t_hv] = shade(&cells, &across, &down, mixed);
         let scale = weight * contrast;
         let (a, b) = (scale * t_u * inv_w, scale * t_v * inv_w);
-        let c = -(a * u + b * v);
-        let residual = weight * (f32x8::new(pixels.grey) - black - contrast * t);
-        let values = [
-            a * x,
-            a * y,
-            a,
-            b * x,
-            b * y,
-            b,
-            c * x,
-            c * y,
-            weight,
-            weight * t,
-            scale * t_hu,
-            scale * t_hv,
-            residual,
-        ];
-        *out = values.map(f32x8::to_array);
+        let c = V::splat(0.0) - a.times_plus(u, b * v);
+        let residual = weight * (V::new(pixels.grey) - contrast.times_plus(t, black));
+        out[0] = weight.to_array();
+        out[1] = (weight * t).to_array();
+        out[2] = (scale * t_hu).to_array();
+        out[3] = (scale * t_hv).to_array();
+        out[4] = (a * x).to_array();
+        out[5] = (a * y).to_array();
+        out[6] = a.to_array();
+        out[7] = (b * x).to_array();
+        out[8] = (b * y).to_array();
+        out[9] = b.to_array();
+        out[10] = (c * x).to_array();
+        out[11] = (c * y).to_array();
+        out[12] = residual.to_array();
     }
 }
 
-/// Products summed over all pixels.
-fn sum_products(derivatives: &[Derivatives]) -> Products {
+/// Products summed over all pixels, four sums at a time: as many as hide how long an addition takes.
+#[inline(always)]
+fn sum_products<V: Vector>(derivatives: &[Derivatives]) -> Products {
     let mut products = [[0.0; COUNT]; COUNT];
     for i in 0..COUNT {
-        for j in 0..=i {
-            let mut sums: Lanes = [0.0; LANES];
+        for j in (0..=i).step_by(4) {
+            let (a, b, c, d) = (j, (j + 1).min(i), (j + 2).min(i), (j + 3).min(i));
+            let zero = V::splat(0.0);
+            let (mut to_a, mut to_b, mut to_c, mut to_d) = (zero, zero, zero, zero);
             for all in derivatives {
-                for lane in 0..LANES {
-                    sums[lane] += all[i][lane] * all[j][lane];
-                }
+                let own = V::new(all[i]);
+                to_a = own.times_plus(V::new(all[a]), to_a);
+                to_b = own.times_plus(V::new(all[b]), to_b);
+                to_c = own.times_plus(V::new(all[c]), to_c);
+                to_d = own.times_plus(V::new(all[d]), to_d);
             }
-            let value = sum(&sums);
-            products[i][j] = value;
-            products[j][i] = value;
+            for (k, lanes) in
+                [(a, to_a.to_array()), (b, to_b.to_array()), (c, to_c.to_array()), (d, to_d.to_array())]
+            {
+                let value = sum(&lanes);
+                products[i][k] = value;
+                products[k][i] = value;
+            }
         }
     }
     products
@@ -192,79 +130,115 @@ fn sum_products(derivatives: &[Derivatives]) -> Products {
 /// Halves onto halves: no addition waits for more than two others.
 #[inline(always)]
 fn sum(lanes: &Lanes) -> f32 {
-    let four: [f32; 4] = std::array::from_fn(|k| lanes[k] + lanes[k + 4]);
-    (four[0] + four[2]) + (four[1] + four[3])
+    ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
 }
 
 /// T and its derivatives by u, v, h_u, h_v.
 #[inline(always)]
-fn shade(cells: &[f32x8; 9], across: &Weights, down: &Weights, mixed: f32x8) -> [f32x8; 5] {
-    let (rows, rows_u, rows_h) =
-        (along(cells, across.of), along(cells, across.by_place), along(cells, across.by_blur));
+fn shade<V: Vector>(cells: &[Row<V>; 3], across: &Weights<V>, down: &Weights<V>, mixed: V) -> [V; 5] {
+    let [above, here, below] = cells;
+    let rows = Row::new(
+        across.of.times_plus(above, above.here),
+        across.of.times_plus(here, here.here),
+        across.of.times_plus(below, below.here),
+    );
+    let rows_u =
+        Row::new(across.by_place.times(above), across.by_place.times(here), across.by_place.times(below));
+    let rows_h =
+        Row::new(across.by_blur.times(above), across.by_blur.times(here), across.by_blur.times(below));
     [
-        over(down.of, rows) + mixed * over(down.by_place, rows_u),
-        over(down.of, rows_u),
-        over(down.by_place, rows),
-        over(down.of, rows_h),
-        over(down.by_blur, rows),
+        mixed.times_plus(down.by_place.times(&rows_u), down.of.times_plus(&rows, rows.here)),
+        down.of.times_plus(&rows_u, rows_u.here),
+        down.by_place.times(&rows),
+        down.of.times_plus(&rows_h, rows_h.here),
+        down.by_blur.times(&rows),
     ]
 }
 
-#[inline(always)]
-fn along(c: &[f32x8; 9], w: [f32x8; 3]) -> [f32x8; 3] {
-    [
-        w[0] * c[0] + w[1] * c[1] + w[2] * c[2],
-        w[0] * c[3] + w[1] * c[4] + w[2] * c[5],
-        w[0] * c[6] + w[1] * c[7] + w[2] * c[8],
-    ]
+/// Three values in a row, as the middle one and what the others are above it.
+struct Row<V> {
+    before: V,
+    here: V,
+    after: V,
 }
 
-#[inline(always)]
-fn over(w: [f32x8; 3], rows: [f32x8; 3]) -> f32x8 {
-    w[0] * rows[0] + w[1] * rows[1] + w[2] * rows[2]
+impl<V: Vector> Row<V> {
+    #[inline(always)]
+    fn new(before: V, here: V, after: V) -> Self {
+        Self { before: before - here, here, after: after - here }
+    }
+
+    /// The colours of cells: see [`Pixels::around`].
+    #[inline(always)]
+    fn of_cells(around: &[i32; LANES]) -> [Self; 3] {
+        [
+            Self::new(V::bit::<0>(around), V::bit::<1>(around), V::bit::<2>(around)),
+            Self::new(V::bit::<3>(around), V::bit::<4>(around), V::bit::<5>(around)),
+            Self::new(V::bit::<6>(around), V::bit::<7>(around), V::bit::<8>(around)),
+        ]
+    }
 }
 
-/// What a cell and its two neighbours contribute at a place in the cell.
-struct Weights {
-    of: [f32x8; 3],
-    by_place: [f32x8; 3],
-    by_blur: [f32x8; 3],
+/// What the neighbours before and after contribute beyond the cell itself.
+struct Share<V> {
+    before: V,
+    after: V,
 }
 
-impl Weights {
+impl<V: Vector> Share<V> {
+    #[inline(always)]
+    fn times(&self, row: &Row<V>) -> V {
+        self.before.times_plus(row.before, self.after * row.after)
+    }
+
+    #[inline(always)]
+    fn times_plus(&self, row: &Row<V>, addend: V) -> V {
+        self.before.times_plus(row.before, self.after.times_plus(row.after, addend))
+    }
+}
+
+/// What a cell's two neighbours contribute at a place in the cell, in its stead, and the derivatives of that.
+struct Weights<V> {
+    of: Share<V>,
+    by_place: Share<V>,
+    by_blur: Share<V>,
+}
+
+impl<V: Vector> Weights<V> {
     /// `place` from 0 to 1 across the cell.
     #[inline(always)]
-    fn new(place: f32x8, inv_blur: f32x8) -> Self {
-        let rest = f32x8::ONE - place;
-        let (before, slope_before) = beyond(place * inv_blur);
-        let (after, slope_after) = beyond(rest * inv_blur);
-        let (slope_before, slope_after) = (slope_before * inv_blur, slope_after * inv_blur);
-        // d(d/h)/dh = −(d/h)/h, and the share beyond falls with d/h.
-        let by_blur_before = slope_before * place * inv_blur;
-        let by_blur_after = slope_after * rest * inv_blur;
+    fn new(place: V, inv_blur: V) -> Self {
+        let (tau_before, tau_after) = (place * inv_blur, (V::splat(1.0) - place) * inv_blur);
+        let (before, kernel_before) = beyond(tau_before);
+        let (after, kernel_after) = beyond(tau_after);
+        let (slope_before, slope_after) = (kernel_before * inv_blur, kernel_after * inv_blur);
         Self {
-            of: [before, f32x8::ONE - before - after, after],
-            by_place: [-slope_before, slope_before - slope_after, slope_after],
-            by_blur: [by_blur_before, -by_blur_before - by_blur_after, by_blur_after],
+            of: Share { before, after },
+            by_place: Share { before: V::splat(0.0) - slope_before, after: slope_after },
+            // d(d/h)/dh = −(d/h)/h, and the share beyond falls with d/h.
+            by_blur: Share { before: slope_before * tau_before, after: slope_after * tau_after },
         }
     }
 }
 
 /// The share of the kernel that lies beyond an edge at a distance of τ half-widths, and the kernel there.
 #[inline(always)]
-fn beyond(tau: f32x8) -> (f32x8, f32x8) {
-    let tau = tau.fast_max(-f32x8::ONE).fast_min(f32x8::ONE);
+fn beyond<V: Vector>(tau: V) -> (V, V) {
+    let tau = tau.bounded(-1.0, 1.0);
     let t2 = tau * tau;
-    let rest = f32x8::ONE - t2;
-    let share =
-        tau * (f32x8::ONE - t2 * (f32x8::ONE - t2 * (f32x8::splat(0.6) - t2 * f32x8::splat(1.0 / 7.0))));
-    (f32x8::HALF - f32x8::splat(PEAK) * share, f32x8::splat(PEAK) * rest * rest * rest)
+    let rest = V::splat(1.0) - t2;
+    // PEAK τ (1 − τ² + 3/5 τ⁴ − τ⁶/7)
+    let series = t2.times_plus(V::splat(-PEAK / 7.0), V::splat(PEAK * 0.6));
+    let series = t2.times_plus(t2.times_plus(series, V::splat(-PEAK)), V::splat(PEAK));
+    (V::splat(0.5) - tau * series, V::splat(PEAK) * rest * (rest * rest))
 }
 
 #[cfg(test)]
 mod tests {
+    use wide::f32x8;
+
     use super::*;
-    use crate::detect::expected::pattern::Pattern;
+    use crate::detect::expected::pattern::{CELLS, Pattern};
 
     /// Derivatives that a step of a thousandth of a cell cannot tell from differences.
     const TOLERANCE: f32 = 5e-3;
@@ -276,7 +250,8 @@ mod tests {
         for blur in [[0.3f32, 0.45], [0.9, 0.2]] {
             for k in 0..400 {
                 let (u, v) = (0.3 + 0.47 * (k % 20) as f32, 0.4 + 0.46 * (k / 20) as f32);
-                let cells = pattern.around(u as usize, v as usize).map(f32x8::splat);
+                let cells =
+                    Row::of_cells(&[i32::from(pattern.around(v as usize * CELLS + u as usize)); LANES]);
                 let shade = |du: f32, dv: f32, [hu, hv]: [f32; 2]| {
                     let across = Weights::new((u - u.floor() + du).into(), (1.0 / hu).into());
                     let down = Weights::new((v - v.floor() + dv).into(), (1.0 / hv).into());
