@@ -11,6 +11,7 @@
 mod bound;
 mod corners;
 mod covariance;
+mod disturbance;
 mod error;
 mod fast;
 mod film;
@@ -43,6 +44,9 @@ pub struct Args {
     /// Length of each film, seconds, in place of the part's own.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
+    /// Of the disturbances, only those whose names hold this.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    pub only: String,
 }
 
 /// One experiment.
@@ -62,6 +66,8 @@ pub enum Part {
     Corners,
     /// Tags hidden, misread, exchanged.
     Outliers,
+    /// Covered lenses, strangers, torn tags, posters, wrong light, a bumped camera, bad frames.
+    Disturbances,
 }
 
 impl Part {
@@ -123,6 +129,10 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
     }
     if wants(Part::Corners) {
         corners::run(seed, &mut report)?;
+    }
+    if wants(Part::Disturbances) {
+        let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
+        disturbance::run(&stage, &args.only, seed, &mut report, &mut enter)?;
     }
     ledger.report(&mut report);
     Ok(report)
