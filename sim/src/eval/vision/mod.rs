@@ -10,6 +10,7 @@
 
 mod bound;
 mod corners;
+mod count;
 mod covariance;
 mod disturbance;
 mod error;
@@ -68,6 +69,8 @@ pub enum Part {
     Outliers,
     /// Covered lenses, strangers, torn tags, posters, wrong light, a bumped camera, bad frames.
     Disturbances,
+    /// Wrong poses, over as many scenes as `--seconds` lasts.
+    Count,
 }
 
 impl Part {
@@ -133,6 +136,10 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
     if wants(Part::Disturbances) {
         let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
         disturbance::run(&stage, &args.only, seed, &mut report, &mut enter)?;
+    }
+    if wants(Part::Count) {
+        let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
+        count::run(&stage, seed, seconds(count::SECONDS), &mut enter)?;
     }
     ledger.report(&mut report);
     Ok(report)
