@@ -66,9 +66,8 @@ function overlay(ctx, head, scale) {
     ctx.lineWidth = 1.5;
     outline(tag.corners, tag.accepted ? ACCEPTED : REFUSED);
     if (tag.accepted) continue;
-    // Why not: too far from where the shell's pose has it, or no pose at all.
-    const why = tag.off_px === null ? 'no pose' : `${tag.off_px.toFixed(1)} px off`;
-    label(ctx, `${tag.id}: ${why}`, at(tag.corners[2]), REFUSED);
+    const off = tag.off_px === null ? '' : `, ${tag.off_px.toFixed(1)} px off`;
+    label(ctx, `${tag.id}: ${tag.fate}${off}`, at(tag.corners[2]), REFUSED);
   }
   ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
   for (const shell of head.axes) {

@@ -184,7 +184,11 @@ mod tests {
         };
         let mut observation = Observation { capture_ns, ..Observation::default() };
         observation.world_from_shell[Shell::RightPalm as usize] = Some(motion.world_from_shell);
-        let sut = Tracked::new(observation, &Motions::new(vec![None, Some(motion)], 250_000_000), &shells);
+        let sut = Tracked::new(
+            observation,
+            &Motions::new(vec![None, Some(motion)], Vec::new(), 250_000_000),
+            &shells,
+        );
         let x = |now_ns| {
             let seen = sut.at(now_ns, 60_000_000, &filter);
             assert_eq!((seen.capture_ns, seen.shell(Shell::Torso)), (capture_ns, None));

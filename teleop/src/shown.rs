@@ -34,3 +34,10 @@ pub fn put(board: &Board, shells: &ShellSet, update: TrackUpdate, mut images: Ve
         shown.insert(seen.camera, Arc::new(Shown { image, shells: poses.clone(), seen }));
     }
 }
+
+/// What to say of a camera whose tags lie so far from where the poses have them.
+pub fn moved(moved_px: f64) -> String {
+    format!(
+        "has moved: it sees tags {moved_px:.0} px from where the other cameras have them; put it back or calibrate the rig"
+    )
+}

@@ -83,7 +83,7 @@ impl Solver {
             let now_ns = monotonic_ns();
             self.gather.wait_over(now_ns);
             while let Some(readings) = self.gather.pop() {
-                self.solve(readings, &mut published_ns);
+                self.solve(readings, &mut published_ns, &mut watch);
             }
             watch.look(&self.counters, &self.board, now_ns);
         }
@@ -96,7 +96,7 @@ impl Solver {
         wait.map_or(NAP, |wait| wait.clamp(Duration::from_millis(1), NAP))
     }
 
-    fn solve(&mut self, readings: Vec<Reading>, published_ns: &mut u64) {
+    fn solve(&mut self, readings: Vec<Reading>, published_ns: &mut u64, watch: &mut Watch) {
         let in_memory_ns = readings.iter().map(|reading| reading.in_memory_ns).max().unwrap_or(0);
         let (mut updates, mut images) = (Vec::with_capacity(readings.len()), Vec::new());
         for Reading { update, image, .. } in readings {
@@ -105,6 +105,7 @@ impl Solver {
         }
         let update = self.fusion.update(updates);
         self.tell(update.time_ns);
+        watch.moved(&update, &self.counters, &self.board);
         // A straggler has improved what is known; its own instant is history.
         if update.time_ns > *published_ns {
             *published_ns = update.time_ns;
@@ -167,15 +168,33 @@ impl Solver {
     }
 }
 
-/// Says when a camera falls silent, and when it is back.
+/// Says when a camera falls silent or is found to have moved, and when it is back.
 #[derive(Debug)]
 struct Watch {
     silent: Vec<bool>,
+    moved: Vec<bool>,
 }
 
 impl Watch {
     fn new(counters: &Counters) -> Self {
-        Self { silent: vec![false; counters.cameras.len()] }
+        let none = vec![false; counters.cameras.len()];
+        Self { silent: none.clone(), moved: none }
+    }
+
+    fn moved(&mut self, update: &TrackUpdate, counters: &Counters, board: &Board) {
+        for seen in &update.cameras {
+            let Some(was_moved) = self.moved.get_mut(seen.camera) else { continue };
+            if seen.moved_px.is_some() == *was_moved {
+                continue;
+            }
+            *was_moved = seen.moved_px.is_some();
+            let id = counters.ids().get(seen.camera).map_or("", String::as_str);
+            let detail = match seen.moved_px {
+                Some(moved_px) => format!("{id} {}", shown::moved(moved_px)),
+                None => format!("{id} is where the rig file says again"),
+            };
+            board.happened(Note { name: "camera", detail });
+        }
     }
 
     fn look(&mut self, counters: &Counters, board: &Board, now_ns: u64) {

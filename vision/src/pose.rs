@@ -78,6 +78,19 @@ pub enum Fate {
     Unsolved,
 }
 
+impl std::fmt::Display for Fate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Used => "used",
+            Self::Outlier => "does not fit",
+            Self::FacingAway => "faces away",
+            Self::Ambiguous => "ambiguous",
+            Self::Unusable => "unusable",
+            Self::Unsolved => "no pose",
+        })
+    }
+}
+
 /// Why there is no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {

@@ -16,6 +16,7 @@
 //! durations: the same frames give the same poses.
 
 mod admission;
+mod alignment;
 mod eye;
 mod filter;
 mod fusion;
@@ -30,7 +31,7 @@ use rayon::prelude::*;
 
 use crate::detect::DetectorError;
 use crate::image::Frame;
-pub use crate::pose::Matrix18;
+pub use crate::pose::{Fate, Matrix18};
 use crate::rig::Rig;
 use crate::shells::ShellSet;
 use crate::source::FrameSet;
@@ -38,6 +39,7 @@ pub use admission::Dropped;
 pub use eye::Eye;
 pub use filter::{FilterSettings, Manoeuvre, Motion};
 pub use fusion::{Fusion, Motions};
+pub use hinge::Hinge;
 pub use scout::Scout;
 pub use settings::TrackerSettings;
 pub use update::{CameraUpdate, MissedTag, SeenTag, ShellUpdate, TagOwners, TrackUpdate, Verdict};

@@ -85,7 +85,8 @@ pub struct StopSettings {
     pub max_acceleration: f64,
     /// Share of the model's joint velocities that is used.
     pub speed_share: f64,
-    /// A desired joint position is at most the way of this time at that speed away from where the joint is, s.
+    /// A desired joint position is at most the way of this time, at what is left to that speed, away from where the joint
+    /// is, s.
     pub step_time_s: f64,
     /// Links stay so far apart, m.
     pub collision_margin: f64,

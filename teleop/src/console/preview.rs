@@ -38,6 +38,8 @@ struct Head<'a> {
 struct Tag {
     id: u32,
     accepted: bool,
+    /// `used`, or why not.
+    fate: String,
     corners: [[f64; 2]; 4],
     /// Where the shell's pose has its corners.
     reprojected: Option<[[f64; 2]; 4]>,
@@ -92,7 +94,8 @@ fn tag(tag: &SeenTag) -> Tag {
     };
     Tag {
         id: tag.detection.id,
-        accepted: tag.used,
+        accepted: tag.is_used(),
+        fate: tag.fate.to_string(),
         corners: corners.map(Into::into),
         reprojected: tag.reprojected_px.map(|corners| corners.map(Into::into)),
         off_px: tag.reprojected_px.as_ref().map(off),

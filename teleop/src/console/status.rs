@@ -14,7 +14,7 @@ use crate::board::Board;
 use crate::gather::SILENT_NS;
 use crate::latency::Stage;
 use crate::latest::lock;
-use crate::shown::Shown;
+use crate::shown::{self, Shown};
 use crate::sight::CameraCounters;
 
 /// A tracking report older than this is no news.
@@ -239,17 +239,23 @@ fn cameras(board: &Board, now_ns: u64) -> Vec<CameraStatus> {
                 error_ms: ms(clock.error_ns),
                 drift_ppm: clock.drift_ppm,
             }),
-            problem: counters.problem(),
+            problem: problem(counters, shown.get(&index).map(Arc::as_ref)),
             seen: seen(shown.get(&index).map(Arc::as_ref)),
         }
     };
     cameras.map(status).collect()
 }
 
+/// Why the last image of a camera could not be used, or cannot be trusted; empty if it can.
+fn problem(counters: &CameraCounters, shown: Option<&Shown>) -> String {
+    let moved = || shown.and_then(|shown| shown.seen.moved_px).map(shown::moved);
+    Some(counters.problem()).filter(|problem| !problem.is_empty()).or_else(moved).unwrap_or_default()
+}
+
 fn seen(shown: Option<&Shown>) -> SeenStatus {
     let tags = |used: bool| {
         let tags = shown.iter().flat_map(|shown| &shown.seen.tags);
-        tags.filter(|tag| tag.used == used).map(|tag| tag.detection.id).collect()
+        tags.filter(|tag| tag.is_used() == used).map(|tag| tag.detection.id).collect()
     };
     SeenStatus { accepted: tags(true), refused: tags(false) }
 }

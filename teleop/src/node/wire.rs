@@ -1,14 +1,18 @@
-//! What goes between a camera node and the station, as messages: detections one way, motions the other.
+//! What goes between a camera node and the station, as messages: detections one way, [`motions`] the other.
 //!
 //! What comes in is checked here: after that, numbers are finite, and cameras, shells and sizes are the rig's.
 
-use locoman_protocol::geometry;
+mod motions;
+
+use locoman_protocol::messages::missed_tag;
 use locoman_protocol::messages::{self, Detections, TagDetection};
+use locoman_vision::detect::expected::Refusal;
 use locoman_vision::detect::{CornerCovariance, Detection, Rect};
 use locoman_vision::rig::Rig;
-use locoman_vision::shells::ShellSet;
-use locoman_vision::track::{CameraUpdate, Matrix18, Motion, Motions, TagOwners};
-use nalgebra::{Point2, SMatrix, Vector3};
+use locoman_vision::track::{CameraUpdate, MissedTag, TagOwners};
+use nalgebra::{Point2, SMatrix};
+
+pub use motions::{motions, motions_message};
 
 /// Why a message is of no use.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -58,6 +62,7 @@ pub fn detections(rig: &Rig, update: &CameraUpdate) -> Detections {
         decode_ns: update.decode_ns,
         detect_ns: update.detect_ns,
         problem: update.problem.clone().unwrap_or_default(),
+        missed: update.missed.iter().map(missed_message).collect(),
         ..Detections::default()
     }
 }
@@ -67,9 +72,17 @@ fn tag_message(detection: &Detection) -> TagDetection {
         id: detection.id,
         hamming: detection.hamming,
         margin: detection.margin,
-        corners_px: detection.corners_px.iter().flat_map(|corner| [corner.x, corner.y]).collect(),
+        corners_px: numbers(&detection.corners_px),
         covariance_px2: detection.covariance_px2.as_ref().map(lower_triangle).unwrap_or_default(),
         decimate: detection.decimate,
+    }
+}
+
+fn missed_message(missed: &MissedTag) -> messages::MissedTag {
+    messages::MissedTag {
+        id: missed.id,
+        corners_px: numbers(&missed.corners_px),
+        refusal: sent(missed.refusal).into(),
     }
 }
 
@@ -86,6 +99,7 @@ pub fn camera_update(rig: &Rig, owners: &TagOwners, message: &Detections) -> Res
         return Err(WireError::Size { camera: id.clone(), got, want });
     }
     let found = message.tags.iter().map(|tag| detection(id, tag)).collect::<Result<Vec<_>, _>>()?;
+    let missed = message.missed.iter().map(|tag| missed(id, owners, tag));
     let rect = |region: &messages::Region| Rect {
         x: region.x.min(want.0),
         y: region.y.min(want.1),
@@ -95,6 +109,7 @@ pub fn camera_update(rig: &Rig, owners: &TagOwners, message: &Detections) -> Res
     let capture_ns = message.header.as_ref().map_or(0, |header| header.capture_ns);
     Ok(CameraUpdate {
         tags: owners.assign(found),
+        missed: missed.filter_map(Result::transpose).collect::<Result<_, _>>()?,
         searched: message.searched.iter().map(rect).collect(),
         searched_whole: message.searched_whole,
         decode_ns: message.decode_ns,
@@ -106,12 +121,10 @@ pub fn camera_update(rig: &Rig, owners: &TagOwners, message: &Detections) -> Res
 
 fn detection(camera: &str, tag: &TagDetection) -> Result<Detection, WireError> {
     let wrong = |what| WireError::Tag { camera: camera.to_owned(), tag: tag.id, what };
-    let numbers = tag.corners_px.iter().chain(&tag.covariance_px2).chain([&tag.margin]);
+    let numbers = tag.covariance_px2.iter().chain([&tag.margin]);
     if !numbers.into_iter().all(|number| number.is_finite()) || !tag.decimate.is_finite() {
-        return Err(wrong("a number that is not finite"));
+        return Err(wrong(NOT_FINITE));
     }
-    let corners: &[f64; 8] =
-        tag.corners_px.as_slice().try_into().map_err(|_| wrong("other than 8 corner coordinates"))?;
     let covariance_px2: Option<CornerCovariance> = match tag.covariance_px2.as_slice() {
         [] => None,
         triangle => {
@@ -127,61 +140,64 @@ fn detection(camera: &str, tag: &TagDetection) -> Result<Detection, WireError> {
         id: tag.id,
         hamming: tag.hamming,
         margin: tag.margin,
-        corners_px: std::array::from_fn(|k| Point2::new(corners[2 * k], corners[2 * k + 1])),
+        corners_px: corners(&tag.corners_px).map_err(wrong)?,
         decimate: tag.decimate,
         covariance_px2,
     })
 }
 
-/// Where the shells are and how they move.
-pub fn motions_message(motions: &Motions, shells: &ShellSet) -> messages::Motions {
-    let vector = |v: &Vector3<f64>| Some(messages::Vector3 { x: v.x, y: v.y, z: v.z });
-    let shell = |(shell, motion): (&locoman_vision::shells::Shell, &Option<Motion>)| {
-        let motion = motion.as_ref()?;
-        Some(messages::ShellMotion {
-            shell: shell.name.clone(),
-            time_ns: motion.time_ns,
-            pose: Some(geometry::pose(&motion.world_from_shell)),
-            velocity_m_s: vector(&motion.velocity_m_s),
-            rate_rad_s: vector(&motion.rate_rad_s),
-            acceleration_m_s2: vector(&motion.acceleration_m_s2),
-            angular_rad_s2: vector(&motion.angular_rad_s2),
-            acceleration_variance: motion.variance.to_vec(),
-            covariance: lower_triangle(&motion.covariance),
-        })
-    };
-    messages::Motions {
-        shells: shells.shells.iter().zip(motions.latest()).filter_map(shell).collect(),
-        horizon_ns: motions.horizon_ns(),
-        ..messages::Motions::default()
+/// A tag that a node expected and did not read; `None` if it is on no shell, or for a reason that is not known here: it is
+/// for the eye alone.
+fn missed(
+    camera: &str,
+    owners: &TagOwners,
+    tag: &messages::MissedTag,
+) -> Result<Option<MissedTag>, WireError> {
+    let wrong = |what| WireError::Tag { camera: camera.to_owned(), tag: tag.id, what };
+    let corners_px = corners(&tag.corners_px).map_err(wrong)?;
+    Ok(owners.shell_of(tag.id).zip(received(tag.refusal())).map(|(shell, refusal)| MissedTag {
+        id: tag.id,
+        shell,
+        corners_px,
+        refusal,
+    }))
+}
+
+const NOT_FINITE: &str = "a number that is not finite";
+
+const fn sent(refusal: Refusal) -> missed_tag::Refusal {
+    match refusal {
+        Refusal::Unknown => missed_tag::Refusal::Unknown,
+        Refusal::Outside => missed_tag::Refusal::Outside,
+        Refusal::Small => missed_tag::Refusal::Small,
+        Refusal::Cells => missed_tag::Refusal::Cells,
+        Refusal::Contrast => missed_tag::Refusal::Contrast,
+        Refusal::Misfit => missed_tag::Refusal::Misfit,
     }
 }
 
-/// What the station said; a shell of which it says nothing usable is lost.
-pub fn motions(message: &messages::Motions, shells: &ShellSet) -> Motions {
-    let motion = |name: &str| restored(message.shells.iter().find(|shell| shell.shell == name)?);
-    Motions::new(shells.shells.iter().map(|shell| motion(&shell.name)).collect(), message.horizon_ns)
+const fn received(refusal: missed_tag::Refusal) -> Option<Refusal> {
+    match refusal {
+        missed_tag::Refusal::Unspecified => None,
+        missed_tag::Refusal::Unknown => Some(Refusal::Unknown),
+        missed_tag::Refusal::Outside => Some(Refusal::Outside),
+        missed_tag::Refusal::Small => Some(Refusal::Small),
+        missed_tag::Refusal::Cells => Some(Refusal::Cells),
+        missed_tag::Refusal::Contrast => Some(Refusal::Contrast),
+        missed_tag::Refusal::Misfit => Some(Refusal::Misfit),
+    }
 }
 
-fn restored(message: &messages::ShellMotion) -> Option<Motion> {
-    let vector = |v: Option<&messages::Vector3>| {
-        let v = Vector3::new(v?.x, v?.y, v?.z);
-        v.iter().all(|number| number.is_finite()).then_some(v)
-    };
-    let covariance: Matrix18 = symmetric(&message.covariance)?;
-    let variance: [f64; 2] = message.acceleration_variance.as_slice().try_into().ok()?;
-    let finite = covariance.iter().chain(&variance).all(|number| number.is_finite());
-    let motion = Motion {
-        time_ns: message.time_ns,
-        world_from_shell: geometry::isometry(message.pose.as_ref()?).ok()?,
-        velocity_m_s: vector(message.velocity_m_s.as_ref())?,
-        rate_rad_s: vector(message.rate_rad_s.as_ref())?,
-        acceleration_m_s2: vector(message.acceleration_m_s2.as_ref())?,
-        angular_rad_s2: vector(message.angular_rad_s2.as_ref())?,
-        variance,
-        covariance,
-    };
-    finite.then_some(motion)
+fn numbers(corners_px: &[Point2<f64>; 4]) -> Vec<f64> {
+    corners_px.iter().flat_map(|corner| [corner.x, corner.y]).collect()
+}
+
+fn corners(numbers: &[f64]) -> Result<[Point2<f64>; 4], &'static str> {
+    if !numbers.iter().all(|number| number.is_finite()) {
+        return Err(NOT_FINITE);
+    }
+    let numbers: &[f64; 8] = numbers.try_into().map_err(|_| "other than 8 corner coordinates")?;
+    Ok(std::array::from_fn(|k| Point2::new(numbers[2 * k], numbers[2 * k + 1])))
 }
 
 /// Row by row.
@@ -205,9 +221,7 @@ fn symmetric<const N: usize>(triangle: &[f64]) -> Option<SMatrix<f64, N, N>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use locoman_vision::pose::{Matrix18, State};
-    use locoman_vision::track::FilterSettings;
-    use nalgebra::Isometry3;
+    use locoman_vision::shells::ShellSet;
     use std::path::Path;
 
     fn set_up() -> (Rig, ShellSet, TagOwners) {
@@ -230,8 +244,15 @@ mod tests {
             decimate: 0.5,
             covariance_px2: Some(covariance),
         };
+        let missed = MissedTag {
+            id: shells.shells[1].tags[2].id,
+            shell: 1,
+            corners_px: found.corners_px,
+            refusal: Refusal::Cells,
+        };
         CameraUpdate {
             tags: owners.assign(vec![found]),
+            missed: vec![missed],
             searched: vec![Rect { x: 1, y: 2, width: 30, height: 40 }],
             ..CameraUpdate::nothing(2, 77)
         }
@@ -260,25 +281,8 @@ mod tests {
         assert!(complaint(|m| m.width = 640).contains("(640, 720)"));
         assert!(complaint(|m| m.tags[0].corners_px[3] = f64::NAN).contains("not finite"));
         assert!(complaint(|m| m.tags[0].corners_px.truncate(7)).contains("8 corner"));
+        assert!(complaint(|m| m.missed[0].corners_px.truncate(6)).contains("8 corner"));
         assert!(complaint(|m| m.tags[0].covariance_px2.truncate(35)).contains("36"));
         assert!(complaint(|m| m.tags[0].covariance_px2[0] = -1.0).contains("not positive"));
-    }
-
-    #[test]
-    fn motions_survive_the_way_and_what_is_damaged_is_lost() {
-        let (_, shells, _) = set_up();
-        let settings = FilterSettings::default();
-        let state = State {
-            world_from_shell: Isometry3::translation(0.1, 0.2, 1.3),
-            velocity_m_s: Vector3::new(0.1, 0.2, 0.3),
-            rate_rad_s: Vector3::new(1.0, 0.5, 0.0),
-            ..State::still(Isometry3::identity())
-        };
-        let motion = Motion::begin(5, &state, &(Matrix18::identity() * 1e-6)).predicted(9_000_000, &settings);
-        let sent = Motions::new(vec![Some(motion), None, None, None, None], 250);
-        let mut message = motions_message(&sent, &shells);
-        assert_eq!(motions(&message, &shells), sent);
-        message.shells[0].covariance[7] = f64::INFINITY;
-        assert!(motions(&message, &shells).nothing_known_at(9_000_000));
     }
 }

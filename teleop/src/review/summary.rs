@@ -29,6 +29,8 @@ pub struct Camera {
     pub frames: u64,
     pub unusable: u64,
     pub searched_whole: u64,
+    /// Frames before which it was found to have moved from where the rig file has it.
+    pub moved: u64,
     pub tags_seen: u64,
     pub tags_used: u64,
     /// Along each axis.
@@ -87,6 +89,7 @@ impl Summary {
                 frames: tally.frames,
                 unusable: tally.unusable,
                 searched_whole: tally.searched_whole,
+                moved: tally.moved,
                 tags_seen: tally.seen,
                 tags_used: tally.used,
                 residual_rms_px: tally.residuals.rms_px(),
@@ -171,6 +174,13 @@ impl fmt::Display for Summary {
                 100.0 * c.coverage,
                 c.detect_p50_ms,
                 c.detect_p99_ms
+            )?;
+        }
+        for c in self.cameras.iter().filter(|c| c.moved > 0) {
+            writeln!(
+                f,
+                "\ncamera {} has moved from where the rig file has it, in {} of {} frames: calibrate the rig again",
+                c.camera, c.moved, c.frames
             )?;
         }
         writeln!(f, "\ntag  shell           used/seen     rms     mean x, y")?;

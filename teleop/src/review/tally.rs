@@ -94,6 +94,8 @@ pub struct CameraTally {
     pub unusable: u64,
     /// Frames that were searched whole.
     pub searched_whole: u64,
+    /// Frames before which it was found to have moved.
+    pub moved: u64,
     /// Tags that were found.
     pub seen: u64,
     /// Of those, tags that a pose rests on.
@@ -196,12 +198,13 @@ impl Tally {
         }
         camera.frames += 1;
         camera.searched_whole += u64::from(seen.searched_whole);
+        camera.moved += u64::from(seen.moved_px.is_some());
         camera.detect_ns.offer(seen.detect_ns);
         for tag in &seen.tags {
             let tally = self.tags.entry(tag.detection.id).or_default();
             tally.shell = tag.shell;
             (tally.seen, camera.seen) = (tally.seen + 1, camera.seen + 1);
-            if !tag.used {
+            if !tag.is_used() {
                 continue;
             }
             (tally.used, camera.used) = (tally.used + 1, camera.used + 1);

@@ -5,12 +5,13 @@ mod motions;
 use std::time::Instant;
 
 use super::admission::{Admission, Admitted, Dropped};
+use super::alignment::Alignment;
 use super::filter::Motion;
 use super::hinge::Hinge;
 use super::shell::ShellTracker;
 use super::update::{self, CameraUpdate, ShellUpdate, TrackUpdate};
 use super::{TrackerSettings, nanoseconds};
-use crate::pose::{self, Fate, Observation, Views};
+use crate::pose::{self, Observation, Views};
 use crate::rig::Rig;
 use crate::shells::ShellSet;
 pub use motions::Motions;
@@ -27,6 +28,7 @@ pub struct Fusion {
     /// All shells, thumbs after their palms.
     order: Vec<usize>,
     admission: Admission,
+    alignment: Alignment,
     /// The last instant that was reported: readers never go back in time.
     reported_ns: u64,
     /// Memory for the observations of one shell, and where in the updates they stand.
@@ -45,6 +47,7 @@ impl Fusion {
             hinges: vec![None; count],
             order,
             admission: Admission::new(rig.cameras.len()),
+            alignment: Alignment::new(rig.cameras.len()),
             reported_ns: 0,
             observations: Vec::new(),
             places: Vec::new(),
@@ -148,6 +151,9 @@ impl Fusion {
                 update::reproject(shell, described, &motion, &self.rig.cameras, &mut cameras);
             }
         }
+        for camera in cameras.iter_mut().filter(|camera| camera.problem.is_none()) {
+            camera.moved_px = self.alignment.judge(camera);
+        }
         let slowest = |of: fn(&CameraUpdate) -> u64| cameras.iter().map(of).max().unwrap_or(0);
         TrackUpdate {
             time_ns: self.reported_ns,
@@ -207,7 +213,7 @@ impl Fusion {
         };
         let quality = tracker.update(&views, expected.as_ref(), &self.settings);
         for ((c, k), fate) in self.places.iter().zip(tracker.fates()) {
-            cameras[*c].tags[*k].used = *fate == Fate::Used;
+            cameras[*c].tags[*k].fate = *fate;
         }
         Some((time_ns, quality))
     }

@@ -13,10 +13,12 @@ use crate::pose::{Matrix18, State};
 /// What is known of a thumb on its palm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hinge {
-    palm_from_thumb: Isometry3<f64>,
-    covariance: Matrix6<f64>,
-    /// Instants that were seen, up to [`MEMORY`].
-    seen: u32,
+    /// The mean.
+    pub palm_from_thumb: Isometry3<f64>,
+    /// Of position (palm axes, m²), then rotation (thumb axes, rad²).
+    pub covariance: Matrix6<f64>,
+    /// Instants at which both were measured; the newest thousand count.
+    pub seen: u32,
 }
 
 /// Instants after which an old one is forgotten: half a minute at 30 a second.

@@ -8,6 +8,7 @@ use super::filter::Motion;
 use crate::camera::Camera;
 use crate::detect::expected::Refusal;
 use crate::detect::{Detection, Rect};
+use crate::pose::Fate;
 use crate::shells::{Shell, ShellSet};
 use crate::source::mean_ns;
 
@@ -68,8 +69,8 @@ pub struct SeenTag {
     pub shell: usize,
     /// Index of the tag on the shell.
     pub tag: usize,
-    /// Whether the shell's pose rests on it; `false` for outliers and where no pose was found.
-    pub used: bool,
+    /// Whether the shell's pose rests on it, or why not.
+    pub fate: Fate,
     /// Its corners as the shell's pose has them, if there is a pose.
     pub reprojected_px: Option<[Point2<f64>; 4]>,
 }
@@ -77,7 +78,12 @@ pub struct SeenTag {
 impl SeenTag {
     /// A tag of a shell, not yet judged.
     pub fn new(detection: Detection, shell: usize, tag: usize) -> Self {
-        Self { detection, shell, tag, used: false, reprojected_px: None }
+        Self { detection, shell, tag, fate: Fate::Unsolved, reprojected_px: None }
+    }
+
+    /// Whether the shell's pose rests on it.
+    pub fn is_used(&self) -> bool {
+        self.fate == Fate::Used
     }
 }
 
@@ -115,6 +121,9 @@ pub struct CameraUpdate {
     pub detect_ns: u64,
     /// Why its image could not be used.
     pub problem: Option<String>,
+    /// How far its tags lie from where the poses have them, pixels, if that has lasted and other cameras agree with the
+    /// poses: it is no longer where the rig file says.
+    pub moved_px: Option<f64>,
 }
 
 impl CameraUpdate {
@@ -130,6 +139,7 @@ impl CameraUpdate {
             decode_ns: 0,
             detect_ns: 0,
             problem: None,
+            moved_px: None,
         }
     }
 
@@ -203,6 +213,11 @@ impl TagOwners {
     /// The ids, in no order.
     pub fn ids(&self) -> Vec<u32> {
         self.0.keys().copied().collect()
+    }
+
+    /// Index of the shell that a tag is on.
+    pub fn shell_of(&self, id: u32) -> Option<usize> {
+        self.0.get(&id).map(|(shell, _)| *shell)
     }
 
     /// Names the shell of each detection; those that are on none are left out.

@@ -37,7 +37,7 @@ impl TagTally {
             let (Some(camera), Some(update)) = (rig.cameras.get(*index), update.camera(*index)) else {
                 continue;
             };
-            for seen in update.tags.iter().filter(|seen| seen.used) {
+            for seen in update.tags.iter().filter(|seen| seen.is_used()) {
                 let error_px = worst_corner_px(studio, camera, update.capture_ns, seen, shells);
                 self.false_accepted += usize::from(error_px > FALSE_TAG_PX);
             }

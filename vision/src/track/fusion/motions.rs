@@ -14,15 +14,20 @@ pub struct Motions {
 }
 
 impl Motions {
-    /// Motions that were described elsewhere: one for each shell, in the order of the shells; they may be
-    /// trusted for `horizon_ns` after their time.
-    pub fn new(motions: Vec<Option<Motion>>, horizon_ns: u64) -> Self {
-        Self { hinges: vec![None; motions.len()], motions, horizon_ns }
+    /// Motions that were described elsewhere, in the order of the shells; they may be trusted for `horizon_ns`
+    /// after their time. `hinges` has, for each thumb of which it was learned, its palm and how it hangs on it.
+    pub fn new(motions: Vec<Option<Motion>>, hinges: Vec<Option<(usize, Hinge)>>, horizon_ns: u64) -> Self {
+        Self { motions, hinges, horizon_ns }
     }
 
     /// Each as of its last measurement.
     pub fn latest(&self) -> &[Option<Motion>] {
         &self.motions
+    }
+
+    /// For each shell, its palm and how it hangs on it, if it is a thumb and this was learned.
+    pub fn hinges(&self) -> &[Option<(usize, Hinge)>] {
+        &self.hinges
     }
 
     /// For how long after its measurement a motion may be trusted.

@@ -7,11 +7,12 @@ use crate::camera::Camera;
 use crate::detect::Detection;
 use crate::shells::Shell;
 use crate::testing::{self, Noise};
-use crate::track::{SeenTag, Verdict};
+use crate::track::{Fate, SeenTag, Verdict};
 
 mod clocks;
 mod covariance;
 mod harm;
+mod moved;
 
 const MS: u64 = 1_000_000;
 const STEP_NS: u64 = 33_333_333;

@@ -126,8 +126,8 @@ fn outliers_are_marked_as_not_used() {
     let mut cameras = frames(&sut, 10, &[1], &mut noise);
     cameras[0].tags[0].detection.corners_px[2] += Vector2::new(6.0, -4.0);
     let update = sut.update(cameras);
-    assert!(!update.cameras[0].tags[0].used);
-    let used = update.cameras.iter().flat_map(|frame| &frame.tags).filter(|seen| seen.used).count();
+    assert_eq!(update.cameras[0].tags[0].fate, Fate::Outlier);
+    let used = update.cameras.iter().flat_map(|frame| &frame.tags).filter(|seen| seen.is_used()).count();
     let all: usize = update.cameras.iter().map(|frame| frame.tags.len()).sum();
     assert_eq!(used, all - 1);
     assert!(update.cameras[0].tags[1].reprojected_px.is_some());
