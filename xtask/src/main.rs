@@ -38,8 +38,8 @@ enum Command {
 
 #[derive(clap::Args)]
 struct EvalArgs {
-    /// Which one: `vision`, `tracking`, `workspace`, `robustness`; `demo` judges the recording of the last
-    /// headless demo.
+    /// Which one: `vision`, `latency`, `tracking`, `workspace`, `robustness`, `loop`; `demo` judges the recording of
+    /// the last headless demo.
     name: String,
     /// Another seed than the published one.
     #[arg(long)]

@@ -5,6 +5,7 @@
 pub mod body;
 pub mod demo;
 pub mod drive;
+pub mod latency;
 pub mod lockstep;
 pub mod punctuality;
 pub mod report;
@@ -37,6 +38,8 @@ pub struct Args {
 pub enum Experiment {
     /// Poses from rendered images against the truth.
     Vision(vision::Args),
+    /// From images in memory to poses published, by the station's threads in real time.
+    Latency(latency::Args),
     /// A recorded session of the demo: following, latency, control period.
     Demo {
         /// What the station recorded.
@@ -58,6 +61,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let plot = args.json.as_ref().map(|json| json.with_extension("svg"));
     let report = match &args.experiment {
         Experiment::Vision(of) => vision::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::Latency(of) => latency::run(configs, *of, args.seed)?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,

@@ -170,6 +170,8 @@ mod tests {
         // two of them end.
         let edge_px = noise / contrast * (2.0 * std::f64::consts::PI.sqrt() * sigma / side).sqrt();
         let rms_px = (sut.trace() / 8.0).sqrt();
-        assert!((rms_px / (2.0 * edge_px) - 1.0).abs() < 0.1, "{rms_px} px, the edges say {}", 2.0 * edge_px);
+        // A little is lost: the corners themselves are round, and black and contrast have to be found too.
+        let loss = rms_px / (2.0 * edge_px) - 1.0;
+        assert!((0.0..0.15).contains(&loss), "{rms_px} px, the edges say {}", 2.0 * edge_px);
     }
 }

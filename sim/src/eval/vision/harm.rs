@@ -13,7 +13,7 @@ use nalgebra::Vector2;
 use super::error::PoseError;
 use super::film::{Shot, scene_s, truth_at};
 use super::stage::Stage;
-use super::tally::Tally;
+use super::tally::{ShellTally, Tally};
 use crate::eval::{Figure, Must, Report};
 use crate::operator::sensor::mix;
 
@@ -165,8 +165,7 @@ impl Trial {
         report.push(must(figure("flips", sum(|course| course.flips), ""), Must::AtMost(0.0)));
         report.push(must(figure("lost_while_seen", sum(|course| course.lost), ""), Must::AtMost(0.0)));
         report.push(figure("tracked_of_seen", sum(|course| course.tracked) / sum(|course| course.fed), ""));
-        let worst_mm =
-            self.tally.shells.iter().map(|shell| shell.position_worst_mm()).fold(f64::NAN, f64::max);
+        let worst_mm = self.tally.shells.iter().map(ShellTally::position_worst_mm).fold(f64::NAN, f64::max);
         report.push(figure("worst_position", worst_mm, "mm"));
         report.push(figure("wrong_called_tracked", self.tally.wrong() as f64, ""));
     }

@@ -10,7 +10,9 @@
 
 mod bound;
 mod corners;
+mod count;
 mod covariance;
+mod disturbance;
 mod error;
 mod fast;
 mod film;
@@ -43,6 +45,9 @@ pub struct Args {
     /// Length of each film, seconds, in place of the part's own.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
+    /// Of the disturbances, only those whose names hold this.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    pub only: String,
 }
 
 /// One experiment.
@@ -62,6 +67,10 @@ pub enum Part {
     Corners,
     /// Tags hidden, misread, exchanged.
     Outliers,
+    /// Covered lenses, strangers, torn tags, posters, wrong light, a bumped camera, bad frames.
+    Disturbances,
+    /// Wrong poses, over as many scenes as `--seconds` lasts.
+    Count,
 }
 
 impl Part {
@@ -123,6 +132,14 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
     }
     if wants(Part::Corners) {
         corners::run(seed, &mut report)?;
+    }
+    if wants(Part::Disturbances) {
+        let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
+        disturbance::run(&stage, &args.only, seed, &mut report, &mut enter)?;
+    }
+    if wants(Part::Count) {
+        let stage = Stage::new(configs, "two_zed_pairs_rolling_720p", "hand", seed)?;
+        count::run(&stage, seed, seconds(count::SECONDS), &mut enter)?;
     }
     ledger.report(&mut report);
     Ok(report)

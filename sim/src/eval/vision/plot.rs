@@ -72,7 +72,7 @@ fn panel(
     Ok(())
 }
 
-/// Errors without long pauses between them.
+/// Errors without long pauses between them, and without steps back in time: another film begins there.
 fn stretches(shell: &ShellTally) -> impl Iterator<Item = &[PoseError]> {
-    shell.errors.chunk_by(|a, b| b.time_s - a.time_s < GAP_S)
+    shell.errors.chunk_by(|a, b| (0.0..GAP_S).contains(&(b.time_s - a.time_s)))
 }
