@@ -127,7 +127,7 @@ impl Bumped {
         let Some(camera) = update.camera(case::BUMPED) else { return };
         self.images += 1;
         self.tags += camera.tags.len();
-        self.used += camera.tags.iter().filter(|seen| seen.used).count();
+        self.used += camera.tags.iter().filter(|seen| seen.is_used()).count();
         if camera.problem.is_some() {
             self.named_s.get_or_insert(shot.time_s - self.begin_s);
         }
