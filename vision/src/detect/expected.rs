@@ -17,7 +17,6 @@ mod pattern;
 mod places;
 mod rays;
 mod sample;
-mod vector;
 
 use std::collections::BTreeMap;
 

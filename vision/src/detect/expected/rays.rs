@@ -5,8 +5,8 @@
 
 use nalgebra::Point2;
 
-use super::vector::{LANES, Vector};
 use crate::camera::Camera;
+use crate::vector::{LANES, Vector};
 
 /// Distance of the nodes, pixels.
 const STEP: usize = 4;

@@ -14,8 +14,8 @@ use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
 use super::places::{self, Local, Places};
 use super::rays::RayGrid;
-use super::vector::{self, LANES, Vector};
 use crate::image::GrayImage;
+use crate::vector::{self, LANES, Vector};
 
 /// Not so close to the end of the white margin, cells: what lies beyond is unknown.
 const BORDER: f32 = 0.35;

@@ -2,7 +2,7 @@
 
 use super::UNKNOWNS;
 use crate::detect::expected::places::plane;
-use crate::detect::expected::vector::{LANES, Vector};
+use crate::vector::{LANES, Vector};
 
 type Lanes = [f32; LANES];
 
