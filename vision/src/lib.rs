@@ -28,6 +28,7 @@ pub mod rig;
 pub mod shells;
 pub mod source;
 pub mod track;
+mod vector;
 
 #[cfg(test)]
 mod testing;

@@ -23,9 +23,10 @@ mod problem;
 mod state;
 mod term;
 
-use nalgebra::{Isometry3, Point2};
+use nalgebra::{ArrayStorage, Isometry3, Point2};
 
 use crate::camera::Camera;
+use crate::cholesky::Cholesky;
 use crate::detect::CornerCovariance;
 use crate::shells::Shell;
 use problem::{Minimum, Workspace};
@@ -293,7 +294,10 @@ impl Solver {
             return Err(Refusal::NothingAgrees);
         }
         let data = &minimum.normal.hessian;
-        let inverse = |information: Matrix18| information.cholesky().map(|factor| factor.inverse());
+        let inverse = |information: Matrix18| {
+            let factor = Cholesky::of(&information.data.0)?;
+            Some(Matrix18::from_data(ArrayStorage(factor.inverse())))
+        };
         let mut covariance = inverse(data + prior.information).ok_or(Refusal::NothingAgrees)?;
         // The numbers that the data, not the prior, determine: the trace of the share of their information.
         let determined = 18.0 - covariance.dot(&prior.information);

@@ -17,7 +17,6 @@ mod pattern;
 mod places;
 mod rays;
 mod sample;
-mod vector;
 
 use std::collections::BTreeMap;
 
@@ -99,12 +98,13 @@ const BLUR_SIGMAS: f64 = 3.0;
 /// First a few pixels farther from the edges, since these may be off by a pixel,
 const COARSE: Choice = Choice { stride: 3, blur_share: 0.4, spare_px: 0.7, turns: 1 };
 /// until the rest is small beside the blur;
-const COARSELY: Closeness = Closeness { most_steps: 6, settled_px: 0.6 };
+const COARSELY: Closeness = Closeness { most_steps: 6, settled_px: 0.8 };
 /// then more of them close to the edges, where the grey level changes most. Corners do not change by a thousandth of
 /// a pixel if steps are made until they are ten times as small.
 const FINE: Choice = Choice { stride: 1, blur_share: 0.3, spare_px: 0.0, turns: 1 };
-const FINELY: Closeness = Closeness { most_steps: 5, settled_px: 0.1 };
-/// Where motion smears the edges each pixel says less of them: more are taken, up to so many times.
+const FINELY: Closeness = Closeness { most_steps: 5, settled_px: 0.2 };
+/// Where motion smears the edges each pixel says less of them, and the kernel is another: more are taken, up to so many
+/// times, and from as far as the blur reaches.
 const MOST_TURNS: f64 = 4.0;
 
 /// Reads expected tags in the images of one camera. One for each thread.
@@ -220,12 +220,14 @@ impl Desk<'_> {
         scene.places = view.local.places(&local_from_cells.ok_or(Refusal::Misfit)?);
         let smeared = coarse.blur_over(&start).max(1.0);
         let fine = Choice {
-            blur_share: (FINE.blur_share * smeared).min(1.0),
+            blur_share: (FINE.blur_share * smeared * smeared).min(1.0),
             turns: smeared.min(MOST_TURNS).round() as usize,
             ..FINE
         };
         sample::pick(&scene, self.rays, &coarse, &fine, self.picked, self.samples);
-        let fit = self.samples.fit(&coarse, &start, &FINELY).ok_or(Refusal::Misfit)?;
+        // Where the kernel is another, steps promise more than they keep: the last must be short.
+        let closely = Closeness { settled_px: FINELY.settled_px / (smeared * smeared), ..FINELY };
+        let fit = self.samples.fit(&coarse, &start, &closely).ok_or(Refusal::Misfit)?;
         self.judge(view, &fit)
     }
 

@@ -23,6 +23,7 @@ use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use super::state::State;
 use super::{Observation, Views};
 use crate::camera::Camera;
+use crate::cholesky::Cholesky;
 
 /// Squared residual of a tag that a pose puts behind the camera.
 pub(super) const BEHIND: f64 = 1e8;
@@ -57,7 +58,7 @@ pub(super) struct Term {
     pub dt_s: f64,
     /// and how much later than it each was exposed.
     later_s: [f64; 4],
-    whitening: Whitening,
+    whitening: Cholesky<8>,
 }
 
 /// A term at one state.
@@ -84,7 +85,7 @@ impl Term {
     pub fn new(views: &Views<'_>, observation: &Observation, floor_px: f64) -> Option<Self> {
         let camera = views.cameras.get(observation.camera)?;
         let tag = views.shell.tags.get(observation.tag)?;
-        let whitening = Whitening::new(observation, floor_px, views.variance)?;
+        let whitening = whitening(observation, floor_px, views.variance)?;
         let since_s = (i128::from(observation.capture_ns) - i128::from(views.time_ns)) as f64 * 1e-9;
         let delays_s = observation.corners_px.map(|corner| camera.row_delay_s(corner.y));
         let mean_s = delays_s.iter().sum::<f64>() / 4.0;
@@ -101,11 +102,19 @@ impl Term {
     }
 
     /// Residuals and derivatives at a state.
-    pub fn linearize(&self, views: &Views<'_>, eyes: &[View], state: &State) -> Linear {
-        self.try_linearize(views, eyes, state).unwrap_or_else(Linear::behind)
+    pub fn linearize(&self, views: &Views<'_>, eyes: &[View], state: &State, into: &mut Linear) {
+        if self.try_linearize(views, eyes, state, into).is_none() {
+            *into = Linear::behind();
+        }
     }
 
-    fn try_linearize(&self, views: &Views<'_>, eyes: &[View], state: &State) -> Option<Linear> {
+    fn try_linearize(
+        &self,
+        views: &Views<'_>,
+        eyes: &[View],
+        state: &State,
+        into: &mut Linear,
+    ) -> Option<()> {
         let (camera, eye) = (views.cameras.get(self.camera)?, eyes.get(self.camera)?);
         let rotation = state.rotation_after(self.dt_s).to_rotation_matrix().into_inner();
         let from_eye = state.position_after(self.dt_s) - eye.eye;
@@ -137,73 +146,21 @@ impl Term {
                 first = at_mean;
             }
         }
-        let products = products(&self.whitening.applied(rows));
-        Some(Linear {
-            squared: products[RESIDUAL][RESIDUAL],
-            products,
-            squared_px2,
-            faces: (rotation * self.normal).dot(&(first + from_eye)) < 0.0,
-        })
+        self.whitening.whitened_products(&rows, &mut into.products);
+        into.squared = into.products[RESIDUAL][RESIDUAL];
+        into.squared_px2 = squared_px2;
+        into.faces = (rotation * self.normal).dot(&(first + from_eye)) < 0.0;
+        Some(())
     }
 }
 
-/// Sums over the rows of products of their columns; the last column is 0 and there for the compiler's sake.
-fn products(rows: &[[f64; 8]; 8]) -> [[f64; 8]; 8] {
-    let mut sums = [[0.0; 8]; 8];
-    for row in rows {
-        for (sum, factor) in sums.iter_mut().zip(row).take(RESIDUAL + 1) {
-            for (sum, value) in sum.iter_mut().zip(row) {
-                *sum += factor * value;
-            }
-        }
+/// Covariance of a tag's corners, the floor added; `None` if it is none.
+fn whitening(observation: &Observation, floor_px: f64, variance: f64) -> Option<Cholesky<8>> {
+    // A symmetric matrix: its columns are its rows.
+    let mut covariance = observation.covariance_px2.data.0;
+    for (k, row) in covariance.iter_mut().enumerate() {
+        row[k] += floor_px * floor_px;
+        row.iter_mut().for_each(|value| *value *= variance);
     }
-    sums
-}
-
-/// Multiplies rows with L⁻¹, by forward substitution.
-#[derive(Debug, Clone)]
-struct Whitening {
-    /// L below its diagonal,
-    lower: [[f64; 8]; 8],
-    /// and the inverse of its diagonal.
-    inverse_diagonal: [f64; 8],
-}
-
-impl Whitening {
-    /// By Cholesky's decomposition; `None` if the covariance is not positive.
-    fn new(observation: &Observation, floor_px: f64, variance: f64) -> Option<Self> {
-        let mut lower = [[0.0; 8]; 8];
-        let mut inverse_diagonal = [0.0; 8];
-        for i in 0..8 {
-            for j in 0..=i {
-                let floor = if i == j { floor_px * floor_px } else { 0.0 };
-                let mut sum = (observation.covariance_px2[(i, j)] + floor) * variance;
-                for k in 0..j {
-                    sum -= lower[i][k] * lower[j][k];
-                }
-                if i > j {
-                    lower[i][j] = sum * inverse_diagonal[j];
-                } else if sum > 0.0 && sum.is_finite() {
-                    inverse_diagonal[i] = 1.0 / sum.sqrt();
-                } else {
-                    return None;
-                }
-            }
-        }
-        Some(Self { lower, inverse_diagonal })
-    }
-
-    fn applied(&self, mut rows: [[f64; 8]; 8]) -> [[f64; 8]; 8] {
-        for i in 0..8 {
-            let mut row = rows[i];
-            for k in 0..i {
-                let factor = self.lower[i][k];
-                for (value, above) in row.iter_mut().zip(&rows[k]) {
-                    *value -= factor * above;
-                }
-            }
-            rows[i] = row.map(|value| value * self.inverse_diagonal[i]);
-        }
-        rows
-    }
+    Cholesky::of(&covariance)
 }

@@ -29,7 +29,11 @@ pub struct Eye {
     reader: Reader,
     detector: Detector,
     owners: TagOwners,
+    /// Memory for the motions at an image's time, and for the tags of one shell.
+    motions: Vec<Option<Motion>>,
     expected: Vec<Expected>,
+    /// Tags that one image has shown at most.
+    most_tags: usize,
     /// Counts images: in every so many it is this camera's turn to search regions.
     images: usize,
     cameras: usize,
@@ -53,7 +57,9 @@ impl Eye {
             reader: Reader::new(&rig.cameras[index], &ids),
             detector: Detector::new(&ids)?,
             owners,
+            motions: Vec::new(),
             expected: Vec::new(),
+            most_tags: 0,
             images: index,
             cameras: rig.cameras.len(),
         })
@@ -67,8 +73,12 @@ impl Eye {
         let begun = Instant::now();
         self.images += 1;
         let my_turn = self.images.is_multiple_of(self.cameras);
-        let motions = motions.expected_at(capture_ns, &self.settings);
+        let newest = motions;
+        let mut motions = std::mem::take(&mut self.motions);
+        newest.expect_at(capture_ns, &self.settings, &mut motions);
         let mut update = CameraUpdate::nothing(self.index, capture_ns);
+        // At once, so that nothing has to be copied from one place to another while it grows.
+        update.tags.reserve(self.most_tags);
         let mut sought: Option<Region> = None;
         for (shell, motion) in motions.iter().enumerate() {
             match motion {
@@ -93,6 +103,8 @@ impl Eye {
             update.searched.push(region.rect);
             self.add_found(image, found, &mut update);
         }
+        self.motions = motions;
+        self.most_tags = self.most_tags.max(update.tags.len());
         update.detect_ns = nanoseconds(begun.elapsed());
         update
     }

@@ -34,6 +34,8 @@ pub struct Fusion {
     /// Memory for the observations of one shell, and where in the updates they stand.
     observations: Vec<Observation>,
     places: Vec<(usize, usize)>,
+    /// For each shell, when it was measured in this update.
+    measured: Vec<Option<u64>>,
 }
 
 impl Fusion {
@@ -51,6 +53,7 @@ impl Fusion {
             reported_ns: 0,
             observations: Vec::new(),
             places: Vec::new(),
+            measured: vec![None; count],
             rig,
             shells,
             settings,
@@ -132,16 +135,16 @@ impl Fusion {
             self.reported_ns = self.reported_ns.max(mean_ns);
         }
         let mut updates = vec![ShellUpdate::lost(); self.trackers.len()];
-        let mut measured = vec![None; self.trackers.len()];
+        self.measured.fill(None);
         for index in 0..self.order.len() {
             let shell = self.order[index];
             let palm = self.shells.palm_of(shell);
             let at_ns = self.update_shell(shell, palm, &mut cameras);
             let (time_ns, quality) = at_ns.unzip();
             updates[shell] = self.trackers[shell].at(self.reported_ns, quality.flatten(), &self.settings);
-            measured[shell] = quality.flatten().and(time_ns);
+            self.measured[shell] = quality.flatten().and(time_ns);
             if let Some(palm) = palm
-                && let (Some(_), Some(time_ns)) = (measured[palm], measured[shell])
+                && let (Some(_), Some(time_ns)) = (self.measured[palm], self.measured[shell])
             {
                 self.learn_hinge(shell, palm, time_ns);
             }

@@ -9,9 +9,9 @@ use wide::f32x8;
 
 use super::pattern::{BLACK_CELLS, EIGHTS, Pattern};
 use super::places::greys;
-use super::vector::LANES;
 use super::{LEAST_CONTRAST, Refusal, View};
 use crate::image::GrayImage;
+use crate::vector::LANES;
 
 /// Cells that may have the wrong colour, of the 64 of the black square: one corrected bit and a speck of dirt.
 pub const MOST_WRONG_CELLS: u32 = 2;

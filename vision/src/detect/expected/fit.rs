@@ -31,8 +31,8 @@ use lanes::{Derivatives, KERNEL_VARIANCE, Picture};
 use wide::f32x8;
 
 use super::START_BLUR_PX;
-use super::vector::{self, Vector};
 use crate::cholesky::{self, Cholesky};
+use crate::vector::{self, Vector};
 
 /// Unknowns: β, γ, h_u, h_v, then eight of G.
 const UNKNOWNS: usize = 12;

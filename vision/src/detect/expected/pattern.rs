@@ -3,8 +3,8 @@
 //! Coordinates: u in cells to the right, v in cells downwards, both from the top left of the white margin;
 //! the tag's corners (of the black square) lie at 1 and 9.
 
-use super::vector::LANES;
 use crate::detect::tag_bitmap;
+use crate::vector::LANES;
 
 /// Cells along a side, the white margin included.
 pub const CELLS: usize = 10;

@@ -6,9 +6,9 @@
 use nalgebra::{Matrix2, Matrix3, Point2, Vector2};
 use wide::f32x8;
 
-use super::vector::{LANES, Vector};
 use crate::camera::Camera;
 use crate::image::GrayImage;
+use crate::vector::{LANES, Vector};
 
 /// Local coordinates of the ideal image round a tag: origin at its middle, unit half its side.
 #[derive(Debug, Clone, Copy)]

@@ -5,8 +5,8 @@
 
 use nalgebra::Point2;
 
-use super::vector::{LANES, Vector};
 use crate::camera::Camera;
+use crate::vector::{LANES, Vector};
 
 /// Distance of the nodes, pixels.
 const STEP: usize = 4;
@@ -37,11 +37,11 @@ impl RayGrid {
         let per_step = V::splat(1.0 / STEP as f32);
         let (x, y) = (x * per_step, y * per_step);
         let (left, upper) = (x.floor(), y.floor());
-        let (columns, rows) = (left.whole(), upper.whole());
+        let first = upper.times_plus(V::splat(self.columns as f32), left).whole();
         // The nodes round each pixel: x and y of the upper left one, the upper right one, …
         let mut nodes = [[0.0; LANES]; 8];
         for lane in 0..LANES {
-            let first = rows[lane] as usize * self.columns + columns[lane] as usize;
+            let first = first[lane] as usize;
             let above = &self.nodes[first..first + 2];
             let below = &self.nodes[first + self.columns..first + self.columns + 2];
             [nodes[0][lane], nodes[1][lane]] = above[0];

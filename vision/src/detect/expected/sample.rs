@@ -14,8 +14,8 @@ use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
 use super::places::{self, Local, Places};
 use super::rays::RayGrid;
-use super::vector::{self, LANES, Vector};
 use crate::image::GrayImage;
+use crate::vector::{self, LANES, Vector};
 
 /// Not so close to the end of the white margin, cells: what lies beyond is unknown.
 const BORDER: f32 = 0.35;
@@ -36,9 +36,10 @@ pub struct Choice {
 /// Notes which pixels were picked, so that none counts twice.
 #[derive(Debug, Default)]
 pub struct Picked {
+    /// A bit for each pixel of a rectangle, row by row.
     words: Vec<u64>,
-    words_a_row: usize,
-    first: [i32; 2],
+    first: [f32; 2],
+    columns: f32,
 }
 
 /// A tag in an image.
@@ -60,18 +61,25 @@ pub struct Scene<'a> {
 
 impl Picked {
     fn clear(&mut self, [first, last]: [[i32; 2]; 2]) {
-        self.first = first;
-        self.words_a_row = (last[0] - first[0]).max(0) as usize / 64 + 1;
+        let [columns, rows] = [0, 1].map(|axis| (last[axis] - first[axis]).max(0) + 1);
+        self.first = first.map(|number| number as f32);
+        self.columns = columns as f32;
         self.words.clear();
-        self.words.resize(self.words_a_row * ((last[1] - first[1]).max(0) as usize + 1), 0);
+        self.words.resize((columns * rows) as usize / 64 + 1, 0);
     }
 
-    /// Whether a pixel is picked for the first time; `false` outside the bounds.
+    /// Where the bits of eight pixels are.
     #[inline(always)]
-    fn first_time(&mut self, x: i32, y: i32) -> bool {
-        let (x, y) = (x.wrapping_sub(self.first[0]) as usize, y.wrapping_sub(self.first[1]) as usize);
-        let bit = 1 << (x % 64);
-        match self.words.get_mut(y.wrapping_mul(self.words_a_row).wrapping_add(x / 64)) {
+    fn places<V: Vector>(&self, x: V, y: V) -> [i32; LANES] {
+        let (first_x, first_y) = (V::splat(self.first[0]), V::splat(self.first[1]));
+        (y - first_y).times_plus(V::splat(self.columns), x - first_x).whole()
+    }
+
+    /// Whether a pixel is picked for the first time; `false` beyond the rectangle.
+    #[inline(always)]
+    fn first_time(&mut self, place: i32) -> bool {
+        let bit = 1 << (place & 63);
+        match self.words.get_mut(place as usize / 64) {
             Some(word) => {
                 let new = *word & bit == 0;
                 *word |= bit;
@@ -134,7 +142,8 @@ fn pick_with<V: Vector>(
     let origin_y = V::splat(scene.local.origin.y as f32);
     let end = CELLS as f32 - BORDER;
     let image = scene.image;
-    let width = image.width() as i32;
+    // Whole numbers up to 16 million are exact.
+    let width = V::splat(image.width() as f32);
     let turns = (0..choice.turns).map(|turn| turn as f32 / choice.turns as f32);
     let all = turns.flat_map(|turn| scene.pattern.spots(choice.stride).map(move |spots| (turn, spots)));
     for (turn, spots) in all {
@@ -145,12 +154,11 @@ fn pick_with<V: Vector>(
         let v = (aside * reach_v).times_plus(V::new(spots.normal_v), V::new(spots.v));
         let [x, y] = scene.places.pixels(u, v);
         let (x, y) = (places::nearest(x, image.width()), places::nearest(y, image.height()));
-        let (columns, rows) = (x.whole(), y.whole());
+        let (places, bits) = (y.times_plus(width, x).whole(), picked.places(x, y));
         let mut pixels = Pixels::default();
         for lane in 0..LANES {
-            let (x, y) = (columns[lane], rows[lane]);
-            pixels.grey[lane] = f32::from(image.data()[(y * width + x) as usize]);
-            pixels.weight[lane] = if picked.first_time(x, y) { 1.0 } else { 0.0 };
+            pixels.grey[lane] = f32::from(image.data()[places[lane] as usize]);
+            pixels.weight[lane] = f32::from(u8::from(picked.first_time(bits[lane])));
         }
         let [ray_x, ray_y] = rays.at(x, y);
         let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);

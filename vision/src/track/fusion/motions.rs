@@ -43,17 +43,26 @@ impl Motions {
 
     /// The motion of each shell at an instant; `None` for those that are lost.
     pub fn at(&self, time_ns: u64, settings: &TrackerSettings) -> Vec<Option<Motion>> {
-        let at = |motion: &Option<Motion>| {
-            let motion = motion.as_ref().filter(|motion| self.is_recent(motion, time_ns))?;
-            Some(motion.predicted(time_ns, &settings.filter))
-        };
-        self.motions.iter().map(at).collect()
+        self.motions.iter().map(|motion| self.one_at(motion, time_ns, settings)).collect()
+    }
+
+    fn one_at(&self, motion: &Option<Motion>, time_ns: u64, settings: &TrackerSettings) -> Option<Motion> {
+        let motion = motion.as_ref().filter(|motion| self.is_recent(motion, time_ns))?;
+        Some(motion.predicted(time_ns, &settings.filter))
     }
 
     /// As [`Motions::at`], but a thumb that is lost is expected where its palm and what was learned of the two
     /// say; its covariance says how wide to search.
     pub fn expected_at(&self, time_ns: u64, settings: &TrackerSettings) -> Vec<Option<Motion>> {
-        let mut motions = self.at(time_ns, settings);
+        let mut motions = Vec::new();
+        self.expect_at(time_ns, settings, &mut motions);
+        motions
+    }
+
+    /// [`Motions::expected_at`] in memory that is there already.
+    pub fn expect_at(&self, time_ns: u64, settings: &TrackerSettings, motions: &mut Vec<Option<Motion>>) {
+        motions.clear();
+        motions.extend(self.motions.iter().map(|motion| self.one_at(motion, time_ns, settings)));
         for (shell, hinge) in self.hinges.iter().enumerate() {
             let Some((palm, hinge)) = hinge else { continue };
             if motions.get(shell).is_some_and(Option::is_none)
@@ -62,7 +71,6 @@ impl Motions {
                 motions[shell] = hinge.expected(palm, &settings.filter);
             }
         }
-        motions
     }
 
     /// Whether all shells are lost.

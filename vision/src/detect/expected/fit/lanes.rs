@@ -2,7 +2,7 @@
 
 use super::UNKNOWNS;
 use crate::detect::expected::places::plane;
-use crate::detect::expected::vector::{LANES, Vector};
+use crate::vector::{LANES, Vector};
 
 type Lanes = [f32; LANES];
 
@@ -105,26 +105,34 @@ fn sum_products<V: Vector>(derivatives: &[Derivatives]) -> Products {
     let mut products = [[0.0; COUNT]; COUNT];
     for i in 0..COUNT {
         for j in (0..=i).step_by(4) {
-            let (a, b, c, d) = (j, (j + 1).min(i), (j + 2).min(i), (j + 3).min(i));
-            let zero = V::splat(0.0);
-            let (mut to_a, mut to_b, mut to_c, mut to_d) = (zero, zero, zero, zero);
-            for all in derivatives {
-                let own = V::new(all[i]);
-                to_a = own.times_plus(V::new(all[a]), to_a);
-                to_b = own.times_plus(V::new(all[b]), to_b);
-                to_c = own.times_plus(V::new(all[c]), to_c);
-                to_d = own.times_plus(V::new(all[d]), to_d);
+            let others = [j, (j + 1).min(i), (j + 2).min(i), (j + 3).min(i)];
+            let mut sums = [V::splat(0.0); 4];
+            let (pairs, rest) = derivatives.as_chunks::<2>();
+            for [one, other] in pairs {
+                add_products(one, i, others, &mut sums);
+                add_products(other, i, others, &mut sums);
             }
-            for (k, lanes) in
-                [(a, to_a.to_array()), (b, to_b.to_array()), (c, to_c.to_array()), (d, to_d.to_array())]
-            {
-                let value = sum(&lanes);
+            for last in rest {
+                add_products(last, i, others, &mut sums);
+            }
+            for (k, lanes) in others.into_iter().zip(sums) {
+                let value = sum(&lanes.to_array());
                 products[i][k] = value;
                 products[k][i] = value;
             }
         }
     }
     products
+}
+
+/// Adds the products of one column with four others.
+#[inline(always)]
+fn add_products<V: Vector>(all: &Derivatives, own: usize, others: [usize; 4], sums: &mut [V; 4]) {
+    let own = V::new(all[own]);
+    sums[0] = own.times_plus(V::new(all[others[0]]), sums[0]);
+    sums[1] = own.times_plus(V::new(all[others[1]]), sums[1]);
+    sums[2] = own.times_plus(V::new(all[others[2]]), sums[2]);
+    sums[3] = own.times_plus(V::new(all[others[3]]), sums[3]);
 }
 
 /// Halves onto halves: no addition waits for more than two others.
