@@ -30,6 +30,8 @@ pub struct Exposure<'a> {
     pub background: &'a [f32],
     /// Width of the image.
     pub width: usize,
+    /// How often the samples of an edge are drawn anew; 1 leaves edges with some hundredths of their contrast as error.
+    pub draws: u32,
 }
 
 /// The light on each pixel, by rows.
@@ -244,7 +246,8 @@ fn uniform<'a>(hits: impl Iterator<Item = &'a Option<Hit>>) -> Uniform {
     if key.is_none() { Uniform::Nothing } else { Uniform::Surface(sum / count) }
 }
 
-/// The mean of 16 samples, one in each cell of a 4 x 4 grid, each at another slice of the exposure.
+/// The mean of 16 samples, one in each cell of a 4 x 4 grid, each at another slice of the exposure; or of several such
+/// draws.
 fn sampled(
     exposure: &Exposure<'_>,
     among: &Candidates,
@@ -255,16 +258,18 @@ fn sampled(
     // Each column and each row of the grid sees all times evenly: a magic-square-like order.
     const ORDER: [usize; GRID * GRID] = [0, 10, 5, 15, 12, 6, 9, 3, 7, 13, 2, 8, 11, 1, 14, 4];
     let mut random = super::sensor::mix((row as u64) << 32 | column as u64);
-    let turn = random as usize % SLICES;
     let mut sum = 0.0;
-    for (cell, order) in ORDER.iter().enumerate() {
-        random = super::sensor::mix(random);
-        let jitter = |bits: u64| (bits & 0xffff) as f32 / 65536.0;
-        let x = ((cell % GRID) as f32 + jitter(random)) / GRID as f32;
-        let y = ((cell / GRID) as f32 + jitter(random >> 16)) / GRID as f32;
-        let slice = (order / (GRID * GRID / SLICES) + turn) % SLICES;
-        let hit = exposure.view.trace(among, rays.at(x, y), row, slice, exposure.lamp);
-        sum += hit.map_or(behind, |hit| hit.light);
+    for _ in 0..exposure.draws {
+        let turn = random as usize % SLICES;
+        for (cell, order) in ORDER.iter().enumerate() {
+            random = super::sensor::mix(random);
+            let jitter = |bits: u64| (bits & 0xffff) as f32 / 65536.0;
+            let x = ((cell % GRID) as f32 + jitter(random)) / GRID as f32;
+            let y = ((cell / GRID) as f32 + jitter(random >> 16)) / GRID as f32;
+            let slice = (order / (GRID * GRID / SLICES) + turn) % SLICES;
+            let hit = exposure.view.trace(among, rays.at(x, y), row, slice, exposure.lamp);
+            sum += hit.map_or(behind, |hit| hit.light);
+        }
     }
-    sum / (GRID * GRID) as f32
+    sum / (GRID * GRID * exposure.draws as usize) as f32
 }

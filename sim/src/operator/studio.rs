@@ -197,11 +197,12 @@ impl Studio {
 
     /// The picture that a camera of the rig takes with this capture time; `frame` picks its noise.
     pub fn picture(&self, camera: usize, t_s: f64, frame: u64) -> Picture {
-        self.develop(&self.expose(camera, t_s), frame)
+        self.develop(&self.expose(camera, t_s, 1), frame)
     }
 
-    /// The light that falls on a camera's pixels for a picture with this capture time.
-    pub fn expose(&self, camera: usize, t_s: f64) -> Negative {
+    /// The light that falls on a camera's pixels for a picture with this capture time. Edges are sampled in so many
+    /// draws, the same for each picture: where nothing moves their errors would not average out over pictures.
+    pub fn expose(&self, camera: usize, t_s: f64, draws: u32) -> Negative {
         let stand = &self.stands[camera];
         let place = stand.at(t_s);
         let Camera { id, width, height, .. } = &place.camera;
@@ -217,6 +218,7 @@ impl Studio {
                     lamp: &place.lamp,
                     background: &place.background,
                     width: *width as usize,
+                    draws: draws.max(1),
                 })
             }
         };

@@ -234,3 +234,40 @@ impl Harm {
         tags.iter().zip(&spoiled).filter(|(_, spoiled)| !**spoiled).map(|(tag, _)| tag.shell).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use locoman_vision::detect::Detection;
+    use nalgebra::Point2;
+
+    use super::*;
+
+    fn tag(id: u32) -> SeenTag {
+        let corners_px = [[0.0, 30.0], [30.0, 30.0], [30.0, 0.0], [0.0, 0.0]].map(Point2::from);
+        let detection =
+            Detection { id, hamming: 0, margin: 80.0, corners_px, decimate: 1.0, covariance_px2: None };
+        SeenTag::new(detection, 0, id as usize)
+    }
+
+    #[test]
+    fn as_many_tags_are_hidden_and_spoiled_as_are_asked_for() {
+        let harm = Harm { hidden: 0.5, gross: 0.1, swapped: 0.05, ..NONE };
+        let (mut random, mut left, mut good, mut moved) = (1, 0, 0, 0);
+        for _ in 0..200 {
+            let mut tags: Vec<SeenTag> = (0..20).map(tag).collect();
+            good += harm.spoil(&mut tags, &mut random).len();
+            left += tags.len();
+            moved +=
+                tags.iter().filter(|seen| seen.detection.corners_px != tag(0).detection.corners_px).count();
+            let mut ids: Vec<u32> = tags.iter().map(|seen| seen.detection.id).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            assert_eq!(ids.len(), tags.len(), "ids change places, none is made up");
+            assert!(tags.iter().all(|seen| seen.detection.id as usize == seen.tag));
+        }
+        // 4000 tags: four standard deviations are 126 of 2000, 57 of 200.
+        assert!((1874..2126).contains(&left), "{left} left");
+        assert!((143..257).contains(&moved), "{moved} moved");
+        assert!(good < left - moved && good > 1500, "{good} good");
+    }
+}

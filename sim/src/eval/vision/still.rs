@@ -11,7 +11,7 @@ use locoman_vision::track::{TrackUpdate, TrackerSettings, Verdict};
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::bound;
-use super::film::{Coding, Film, Shot, truth_at};
+use super::film::{Coding, Film, STILL_DRAWS, Shot, truth_at};
 use super::stage::Stage;
 use super::tally::Tally;
 use crate::eval::statistics::rms;
@@ -193,7 +193,8 @@ fn noiseless(stage: &Stage, shot: &Shot) -> anyhow::Result<Vec<(usize, Picture)>
     (scene.sensor.read_noise, scene.sensor.shot_noise) = (0.0, 0.0);
     let studio = stage.studio.with_scene(scene)?;
     let cameras = shot.sightings.iter().map(|(camera, _)| *camera);
-    Ok(cameras.map(|camera| (camera, studio.picture(camera, shot.time_s, 0))).collect())
+    let picture = |camera| studio.develop(&studio.expose(camera, shot.time_s, STILL_DRAWS), 0);
+    Ok(cameras.map(|camera| (camera, picture(camera))).collect())
 }
 
 fn pose_bound(

@@ -78,3 +78,48 @@ fn damaged(mut frames: FrameSet, random: &mut u64) -> FrameSet {
     }
     frames
 }
+
+#[cfg(test)]
+mod tests {
+    use locoman_vision::image::Frame;
+
+    use super::*;
+
+    fn moment(capture_ns: u64) -> FrameSet {
+        let frame = |camera| Frame { camera, capture_ns, pixels: Pixels::Encoded(vec![0xff; 5000]) };
+        FrameSet { frames: vec![frame(0), frame(1)] }
+    }
+
+    fn times(sets: &[FrameSet]) -> Vec<u64> {
+        sets.iter().map(FrameSet::time_ns).collect()
+    }
+
+    #[test]
+    fn moments_out_of_order_change_places_and_none_is_lost() {
+        let (mut held, mut random) = (None, 1);
+        let mut arrived = Vec::new();
+        for (time_ns, fault) in [(1, true), (2, true), (3, true), (4, false)] {
+            let fault = fault.then_some(Fault::OutOfOrder);
+            arrived.extend(pass(fault, moment(time_ns), &mut held, &mut random));
+        }
+        assert_eq!(times(&arrived), [2, 1, 3, 4]);
+    }
+
+    #[test]
+    fn a_clock_that_is_fast_takes_its_frames_out_of_the_set() {
+        let arrived = pass(Some(Fault::TwentyMs), moment(1), &mut None, &mut 1);
+        assert_eq!(times(&arrived), [1, 20_000_001]);
+        assert!(arrived.iter().all(|set| set.frames.len() == 1));
+    }
+
+    #[test]
+    fn some_pictures_are_damaged_and_others_are_not() {
+        let mut random = 1;
+        let arrived: Vec<FrameSet> =
+            (0..20).flat_map(|n| pass(Some(Fault::Damaged), moment(n), &mut None, &mut random)).collect();
+        let whole = moment(0).frames.remove(0).pixels;
+        let damaged =
+            arrived.iter().flat_map(|set| &set.frames).filter(|frame| frame.pixels != whole).count();
+        assert!((5..25).contains(&damaged), "{damaged} of 40");
+    }
+}
