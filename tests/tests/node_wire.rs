@@ -38,7 +38,7 @@ impl Station {
         let cameras = 0..rig.cameras.len();
         Self {
             owners: TagOwners::new(shells),
-            eyes: cameras.clone().map(|camera| Eye::new(&rig, camera, shells, &settings).unwrap()).collect(),
+            eyes: cameras.clone().map(|camera| Eye::new(&rig, camera, shells, &settings)).collect(),
             scouts: cameras.map(|camera| Scout::new(&rig, camera, shells, &settings).unwrap()).collect(),
             fusion: Fusion::new(rig.clone(), shells.clone(), settings),
             shells: shells.clone(),
@@ -61,8 +61,11 @@ impl Station {
         }
         let image = frame.pixels.to_gray().unwrap();
         let mut update = self.eyes[camera].look(&image, capture_ns, &motions);
-        if motions.nothing_known_at(capture_ns) {
-            update.add(self.scouts[camera].search(&image, capture_ns));
+        let region = self.eyes[camera].wanted();
+        let whole = motions.nothing_known_at(capture_ns);
+        if whole || region.is_some() {
+            let region = region.filter(|_| !whole);
+            self.scouts[camera].add_to(&mut update, &mut self.eyes[camera], &image, region);
         }
         if remote {
             let header = Header { capture_ns, ..Header::default() };

@@ -62,7 +62,7 @@ impl Tracker {
         let eyes = cameras.clone().map(|camera| Eye::new(&rig, camera, &shells, &settings));
         let scouts = cameras.map(|camera| Scout::new(&rig, camera, &shells, &settings));
         Ok(Self {
-            eyes: eyes.collect::<Result<_, _>>()?,
+            eyes: eyes.collect(),
             scouts: scouts.collect::<Result<_, _>>()?,
             fusion: Fusion::new(rig, shells, settings),
             turn: 0,
@@ -95,8 +95,8 @@ impl Tracker {
             .enumerate()
             .filter_map(|(camera, (eye, scout))| {
                 let frame = frames.frames.iter().find(|frame| frame.camera == camera)?;
-                let scout = (everyone || (lost && turn == camera)).then_some(scout);
-                Some(look(eye, scout, frame, &motions))
+                let whole = everyone || (lost && turn == camera);
+                Some(look(eye, scout, whole, frame, &motions))
             })
             .collect();
         self.fusion.update(seen)
@@ -108,8 +108,8 @@ impl Tracker {
     }
 }
 
-/// One camera's frame: decoded, read where tags are expected, and maybe searched whole.
-fn look(eye: &mut Eye, scout: Option<&mut Scout>, frame: &Frame, motions: &Motions) -> CameraUpdate {
+/// One camera's frame: decoded, read where tags are expected, and maybe searched, whole or in a region.
+fn look(eye: &mut Eye, scout: &mut Scout, whole: bool, frame: &Frame, motions: &Motions) -> CameraUpdate {
     let begun = std::time::Instant::now();
     let image = match frame.pixels.to_gray() {
         Ok(image) => image,
@@ -118,13 +118,9 @@ fn look(eye: &mut Eye, scout: Option<&mut Scout>, frame: &Frame, motions: &Motio
     let decode_ns = nanoseconds(begun.elapsed());
     let mut update = eye.look(&image, frame.capture_ns, motions);
     update.decode_ns = decode_ns;
-    if let Some(scout) = scout {
-        let mut found = scout.search(&image, frame.capture_ns);
-        found.tags.retain(|seen| !update.has_tag(seen.detection.id));
-        for seen in &mut found.tags {
-            eye.sharpen(&image, &mut seen.detection);
-        }
-        update.add(found);
+    let region = eye.wanted().filter(|_| !whole);
+    if whole || region.is_some() {
+        scout.add_to(&mut update, eye, &image, region);
     }
     update
 }

@@ -157,7 +157,7 @@ fn the_way_of_a_frame_takes_only_the_memory_that_it_hands_over() {
     shells.shells = vec![shells.shells.swap_remove(1)];
     let images: Vec<GrayImage> = rig.cameras.iter().map(|camera| image(camera, &shells)).collect();
     let mut eyes: Vec<Eye> =
-        (0..rig.cameras.len()).map(|index| Eye::new(&rig, index, &shells, &settings).unwrap()).collect();
+        (0..rig.cameras.len()).map(|index| Eye::new(&rig, index, &shells, &settings)).collect();
     let mut fusion = Fusion::new(rig.clone(), shells.clone(), settings);
     let first = rig.cameras.iter().enumerate().map(|(k, camera)| seen(k, camera, &shells, STEP_NS)).collect();
     fusion.update(first);

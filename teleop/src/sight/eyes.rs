@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
 
+use locoman_vision::detect::Region;
 use locoman_vision::image::{Frame, GrayImage, ImageError, Pixels};
 use locoman_vision::track::{CameraUpdate, Eye};
 
@@ -11,8 +12,14 @@ use super::scouting::Lookout;
 use super::{Counters, Inbox, Outlook, Reading, Sighting};
 use crate::latest::lock;
 
-/// An image that may have to be searched whole, and when it was exposed.
-pub(super) type Doubtful = (Arc<GrayImage>, u64);
+/// An image that may have to be searched.
+#[derive(Debug)]
+pub(super) struct Doubtful {
+    pub image: Arc<GrayImage>,
+    pub capture_ns: u64,
+    /// Where; `None`: whole, if something is lost by then.
+    pub region: Option<Region>,
+}
 
 /// One thread of the pool.
 pub(super) struct Reader {
@@ -52,17 +59,22 @@ impl Reader {
             }
         };
         let motions = self.outlook.motions();
-        let mut update = match self.eyes.get(camera) {
-            Some(eye) => lock(eye).look(&image, capture_ns, &motions),
-            None => CameraUpdate::nothing(camera, capture_ns),
+        let (mut update, region) = match self.eyes.get(camera) {
+            Some(eye) => {
+                let mut eye = lock(eye);
+                (eye.look(&image, capture_ns, &motions), eye.wanted())
+            }
+            None => (CameraUpdate::nothing(camera, capture_ns), None),
         };
+        update.searched.extend(region.map(|region| region.rect));
         update.decode_ns = in_memory_ns.saturating_sub(begun_ns);
         if motions.nothing_known_at(capture_ns) {
             // Nothing is tracked that this could delay, and all cameras together find a shell best.
             self.search_at_once(&image, &mut update);
-        } else if self.outlook.something_lost() {
+        } else if region.is_some() || self.outlook.something_lost() {
+            let region = region.filter(|_| !self.outlook.something_lost());
             // A search that waits is replaced by the newer one.
-            let _ = self.doubtful.put(camera, (Arc::clone(&image), capture_ns));
+            let _ = self.doubtful.put(camera, Doubtful { image: Arc::clone(&image), capture_ns, region });
         }
         let image = self.outlook.watched.load(Ordering::Relaxed).then_some(image);
         self.noted(Reading { update, in_memory_ns, image }, begun_ns)
@@ -72,7 +84,7 @@ impl Reader {
         let Some(lookout) = self.lookouts.get(update.camera) else { return };
         let mut lookout = lock(lookout);
         if lookout.alert(update.capture_ns) {
-            update.add(lookout.search(image, update.capture_ns));
+            lookout.add_to(update, image, None);
             self.counters.count(update.camera, |counters| &counters.searched_whole);
         }
     }

@@ -5,7 +5,7 @@
 //!                      newest   │      ▲                ▲
 //!                      frames   │      └── Motions      │
 //!                               └► Inbox ─► scout ──────┘
-//!                                  while something is lost
+//!                                  while something is lost, or not where it was expected
 //! ```
 //!
 //! While nobody is known to be there the eyes search whole images themselves.
@@ -58,7 +58,7 @@ pub enum Sighting {
     },
     /// Its tags have been read where they were expected.
     Read(Box<Reading>),
-    /// Its whole image has been searched; it had been read before.
+    /// Its image has been searched, whole or in a region; it had been read before.
     Searched(Box<CameraUpdate>),
 }
 
@@ -149,8 +149,8 @@ impl Sight {
     ) -> Result<Self> {
         let Equipment { rig, shells, settings, here, source, now_ns, to_station } = equipment;
         let cameras = 0..rig.cameras.len();
-        let eye = |camera| Ok(Mutex::new(Eye::new(rig, camera, shells, settings)?));
-        let eyes: Arc<Vec<Mutex<Eye>>> = Arc::new(cameras.clone().map(eye).collect::<Result<_>>()?);
+        let eye = |camera| Mutex::new(Eye::new(rig, camera, shells, settings));
+        let eyes: Arc<Vec<Mutex<Eye>>> = Arc::new(cameras.clone().map(eye).collect());
         let lookout = |camera| Ok(Mutex::new(Lookout::new(rig, camera, shells, settings)?));
         let lookouts: Arc<Vec<Mutex<Lookout>>> = Arc::new(cameras.map(lookout).collect::<Result<_>>()?);
         let frames = Arc::new(Inbox::<Frame>::new(here.len()));

@@ -1,10 +1,11 @@
-//! The search of whole images: beside the eyes and after them while something is lost, by themselves while all is.
+//! The search of images: beside the eyes and after them while something is lost or not where it was expected, by the eyes
+//! themselves while all is lost.
 
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
 
 use locoman_protocol::realtime;
-use locoman_vision::detect::DetectorError;
+use locoman_vision::detect::{DetectorError, Region};
 use locoman_vision::image::GrayImage;
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
@@ -18,7 +19,7 @@ use crate::latest::lock;
 /// see the first person together, and an empty room does not keep the processor busy.
 const ALERT_NS: u64 = 90_000_000;
 
-/// Searches whole images of one camera.
+/// Searches images of one camera.
 #[derive(Debug)]
 pub(super) struct Lookout {
     scout: Scout,
@@ -37,7 +38,7 @@ impl Lookout {
         settings: &TrackerSettings,
     ) -> Result<Self, DetectorError> {
         let (scout, eye) =
-            (Scout::new(rig, camera, shells, settings)?, Eye::new(rig, camera, shells, settings)?);
+            (Scout::new(rig, camera, shells, settings)?, Eye::new(rig, camera, shells, settings));
         Ok(Self { scout, eye, alert_ns: 0 })
     }
 
@@ -50,14 +51,9 @@ impl Lookout {
         due
     }
 
-    /// All tags of shells in an image.
-    pub fn search(&mut self, image: &GrayImage, capture_ns: u64) -> CameraUpdate {
-        let mut found = self.scout.search(image, capture_ns);
-        for seen in &mut found.tags {
-            // A tag that cannot be sharpened keeps the corners that the search has given it.
-            let _ = self.eye.sharpen(image, &mut seen.detection);
-        }
-        found
+    /// Adds all tags of shells in an image, or in a region of it.
+    pub fn add_to(&mut self, update: &mut CameraUpdate, image: &GrayImage, region: Option<Region>) {
+        self.scout.add_to(update, &mut self.eye, image, region);
     }
 }
 
@@ -70,12 +66,15 @@ pub(super) fn run(
     sightings: &SyncSender<Sighting>,
 ) {
     realtime::run_after_others();
-    while let Some((camera, (image, capture_ns))) = doubtful.take() {
-        if outlook.something_lost()
+    while let Some((camera, Doubtful { image, capture_ns, region })) = doubtful.take() {
+        if (region.is_some() || outlook.something_lost())
             && let Some(lookout) = lookouts.get(camera)
         {
-            let found = lock(lookout).search(&image, capture_ns);
-            counters.count(camera, |counters| &counters.searched_whole);
+            let mut found = CameraUpdate::nothing(camera, capture_ns);
+            lock(lookout).add_to(&mut found, &image, region);
+            if found.searched_whole {
+                counters.count(camera, |counters| &counters.searched_whole);
+            }
             // The receiver goes last.
             let _ = sightings.send(Sighting::Searched(Box::new(found)));
         }

@@ -1,7 +1,7 @@
 //! One camera's view of what is already followed: tags are read where they are expected.
 //!
-//! What is not where it should be is searched by the library in a small region round its shell, at most one
-//! region an image and the cameras in turn, so that a hidden shell costs little and no image is late.
+//! What is not where it should be is left to a [`super::Scout`], which searches a region round its shell by the
+//! library: at most one region an image and the cameras in turn, so that a hidden shell costs little.
 
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use super::update::{CameraUpdate, MissedTag, SeenTag, TagOwners};
 use super::{TrackerSettings, nanoseconds};
 use crate::camera::Camera;
 use crate::detect::expected::{Expectation, Reader, Reading};
-use crate::detect::{Detection, Detector, DetectorError, Region, Search};
+use crate::detect::{Detection, Region};
 use crate::image::GrayImage;
 use crate::rig::Rig;
 use crate::shells::ShellSet;
@@ -27,42 +27,33 @@ pub struct Eye {
     shells: ShellSet,
     settings: TrackerSettings,
     reader: Reader,
-    detector: Detector,
-    owners: TagOwners,
     /// Memory for the motions at an image's time, and for the tags of one shell.
     motions: Vec<Option<Motion>>,
     expected: Vec<Expected>,
     /// Tags that one image has shown at most.
     most_tags: usize,
-    /// Counts images: in every so many it is this camera's turn to search regions.
+    /// Counts images: in every so many it is this camera's turn to have a region searched.
     images: usize,
     cameras: usize,
+    wanted: Option<Region>,
 }
 
 impl Eye {
     /// For the camera of this index.
-    pub fn new(
-        rig: &Rig,
-        index: usize,
-        shells: &ShellSet,
-        settings: &TrackerSettings,
-    ) -> Result<Self, DetectorError> {
-        let owners = TagOwners::new(shells);
-        let ids = owners.ids();
-        Ok(Self {
+    pub fn new(rig: &Rig, index: usize, shells: &ShellSet, settings: &TrackerSettings) -> Self {
+        Self {
             index,
             camera: rig.cameras[index].clone(),
             shells: shells.clone(),
             settings: settings.clone(),
-            reader: Reader::new(&rig.cameras[index], &ids),
-            detector: Detector::new(&ids)?,
-            owners,
+            reader: Reader::new(&rig.cameras[index], &TagOwners::new(shells).ids()),
             motions: Vec::new(),
             expected: Vec::new(),
             most_tags: 0,
             images: index,
             cameras: rig.cameras.len(),
-        })
+            wanted: None,
+        }
     }
 
     /// Reads what is expected in an image; `motions` are the newest that are known.
@@ -71,6 +62,7 @@ impl Eye {
             return CameraUpdate::unusable(self.index, capture_ns, problem);
         }
         let begun = Instant::now();
+        self.wanted = None;
         self.images += 1;
         let my_turn = self.images.is_multiple_of(self.cameras);
         let newest = motions;
@@ -98,15 +90,16 @@ impl Eye {
                 None => {}
             }
         }
-        if let Some(region) = sought {
-            let found = self.detector.detect(image, Search::Regions(&[region]));
-            update.searched.push(region.rect);
-            self.add_found(image, found, &mut update);
-        }
+        self.wanted = sought;
         self.motions = motions;
         self.most_tags = self.most_tags.max(update.tags.len());
         update.detect_ns = nanoseconds(begun.elapsed());
         update
+    }
+
+    /// Where in the last image to search for what was not where it was expected.
+    pub const fn wanted(&self) -> Option<Region> {
+        self.wanted
     }
 
     /// Sharpens the corners of tags that a search has found in an image of this camera.
@@ -152,15 +145,6 @@ impl Eye {
         let content = expected.is_empty() || offset.count > 0.0;
         self.expected = expected;
         content
-    }
-
-    fn add_found(&mut self, image: &GrayImage, found: Vec<Detection>, update: &mut CameraUpdate) {
-        for mut seen in self.owners.assign(found) {
-            if !update.has_tag(seen.detection.id) {
-                self.sharpen(image, &mut seen.detection);
-                update.tags.push(seen);
-            }
-        }
     }
 }
 

@@ -104,22 +104,29 @@ impl Fusion {
         self.trackers.iter().map(|tracker| tracker.at(time_ns, None, &self.settings)).collect()
     }
 
-    /// Takes in what a search of a whole image has found of shells that are lost, however late it comes: it begins
-    /// their motion at the time of that image. What it saw of others is left aside: newer frames follow them. Whether
-    /// there was anything.
-    pub fn found(&mut self, mut search: CameraUpdate) -> bool {
-        let known = self.motions().known_at(search.capture_ns);
-        search.tags.retain(|seen| known.get(seen.shell) == Some(&false));
-        if search.tags.is_empty() {
-            return false;
-        }
+    /// Takes in what a search of an image has found, however late it comes, of shells that nothing newer follows: those that
+    /// are lost begin to move at the time of that image, those that were not where they were expected are found again.
+    /// Of the others it only says whether the camera is where it should be. Whether there was anything to take in.
+    pub fn found(&mut self, search: CameraUpdate) -> bool {
+        let capture_ns = search.capture_ns;
         // Not judged by its time: a search takes long, and its image was already taken in by an eye.
         let mut search = [search];
+        for (shell, tracker) in self.trackers.iter().enumerate() {
+            if let Some(motion) = tracker.motion_at(capture_ns, &self.settings) {
+                update::reproject(shell, &self.shells.shells[shell], &motion, &self.rig.cameras, &mut search);
+            }
+        }
+        // Who is told is the next update.
+        let _ = self.alignment.judge(&search[0]);
+        let trackers = &self.trackers;
+        let follows = |shell: usize| trackers.get(shell).is_none_or(|tracker| tracker.follows(capture_ns));
+        search[0].tags.retain(|seen| !follows(seen.shell));
+        if search[0].tags.is_empty() {
+            return false;
+        }
         for index in 0..self.order.len() {
             let shell = self.order[index];
-            if !known[shell] {
-                self.update_shell(shell, self.shells.palm_of(shell), &mut search);
-            }
+            self.update_shell(shell, self.shells.palm_of(shell), &mut search);
         }
         true
     }

@@ -58,6 +58,14 @@ impl ShellTracker {
         self.history.back().map(|last| &last.motion)
     }
 
+    /// Whether it was measured at an instant or since.
+    pub fn follows(&self, time_ns: u64) -> bool {
+        /// A measurement is as old as the rows that it rests on: half of a slow shutter's, and half of the time between two
+        /// frames of cameras out of step.
+        const ABOUT_NS: u64 = 20_000_000;
+        self.motion().is_some_and(|motion| motion.time_ns + ABOUT_NS >= time_ns)
+    }
+
     /// The motion at an instant, if the last measurement is recent enough.
     pub fn motion_at(&self, time_ns: u64, settings: &TrackerSettings) -> Option<Motion> {
         recent(self.motion()?, time_ns, settings)

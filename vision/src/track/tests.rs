@@ -129,14 +129,16 @@ fn a_search_of_a_whole_image_begins_what_is_lost_and_leaves_what_is_followed() {
     let image = testing::render(&rig.cameras[0], &shells, &testing::worn());
     let time_ns = 1_000_000_000;
     let mut scout = Scout::new(&rig, 0, &shells, &settings).expect("scout");
-    let found = scout.search(&image, time_ns);
+    let found = scout.search(&image, time_ns, None);
     let mut sut = Fusion::new(rig, shells, settings);
     assert!(sut.found(found.clone()));
     let begun = sut.motions();
     assert!(begun.known_at(time_ns).contains(&true));
-    // The same again, late: what is known by now stays as it is.
-    sut.found(CameraUpdate { capture_ns: time_ns + 30_000_000, ..found });
-    for (before, after) in begun.latest().iter().zip(sut.motions().latest()) {
-        assert!(before.is_none() || before == after);
-    }
+    // The same again: what is known by now stays as it is.
+    sut.found(found.clone());
+    assert_eq!(begun.latest(), sut.motions().latest());
+    // In a newer image it is found where it is by then.
+    let later_ns = time_ns + 60_000_000;
+    assert!(sut.found(CameraUpdate { capture_ns: later_ns, ..found }));
+    assert!(sut.motions().latest().iter().flatten().any(|motion| motion.time_ns == later_ns));
 }

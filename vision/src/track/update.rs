@@ -111,7 +111,7 @@ pub struct CameraUpdate {
     pub tags: Vec<SeenTag>,
     /// The tags that were expected and not read.
     pub missed: Vec<MissedTag>,
-    /// The regions that were searched.
+    /// The regions that were searched, or are to be.
     pub searched: Vec<Rect>,
     /// Whether the whole image was searched.
     pub searched_whole: bool,

@@ -83,7 +83,7 @@ impl Trial {
         let scouts = cameras.map(|camera| Scout::new(rig, camera, shells, &settings));
         Ok(Self {
             harm,
-            eyes: eyes.collect::<Result<_, _>>()?,
+            eyes: eyes.collect(),
             scouts: scouts.collect::<Result<_, _>>()?,
             fusion: Fusion::new(rig.clone(), shells.clone(), settings),
             turn: 0,
@@ -129,13 +129,10 @@ impl Trial {
             let image: GrayImage = frame.pixels.to_gray()?.into_owned();
             let (eye, scout) = (&mut self.eyes[frame.camera], &mut self.scouts[frame.camera]);
             let mut update = eye.look(&image, frame.capture_ns, &motions);
-            if everyone || (lost && turn == frame.camera) {
-                let mut found = scout.search(&image, frame.capture_ns);
-                found.tags.retain(|seen| !update.has_tag(seen.detection.id));
-                for seen in &mut found.tags {
-                    eye.sharpen(&image, &mut seen.detection);
-                }
-                update.add(found);
+            let whole = everyone || (lost && turn == frame.camera);
+            let region = eye.wanted().filter(|_| !whole);
+            if whole || region.is_some() {
+                scout.add_to(&mut update, eye, &image, region);
             }
             good.extend(self.harm.spoil(&mut update.tags, &mut self.random));
             seen.push(update);
