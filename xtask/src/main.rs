@@ -32,7 +32,7 @@ enum Command {
     Test(test::Args),
     /// Run one reproducible experiment and print its figures beside the paper's or a peer's.
     Eval(EvalArgs),
-    /// Time the control step and its parts.
+    /// Time the control step, the reading of tags and the solve, each with its parts or beside its peers.
     Bench,
 }
 
@@ -69,7 +69,8 @@ fn run(command: Command) -> Result<()> {
         Command::Bench => {
             setup::ensure(setup::Purpose::Run)?;
             // The one profile of this workspace: see the root Cargo.toml.
-            shell::cargo(&["bench", "--profile", "dev", "--workspace", "--bench", "wbc"])
+            let benches = ["--bench", "wbc", "--bench", "read", "--bench", "solve"];
+            shell::cargo(&[&["bench", "--profile", "dev", "--workspace"], benches.as_slice()].concat())
         }
     }
 }
