@@ -2,12 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
-use std::{
-    alloc::{GlobalAlloc, Layout, System},
-    cell::Cell,
-    path::Path,
-};
+#[path = "../../tests/shared/counting_allocator.rs"]
+mod counting_allocator;
 
+use std::path::Path;
+
+use counting_allocator::counted;
 use locoman_robot::{
     collision::Ground,
     commander::{Footing, Limits, Reach, TorsoReach},
@@ -20,30 +20,6 @@ use locoman_robot::{
     },
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting what each thread asks for.
-struct Counting;
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises are those of the system's allocator.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn model() -> Model {
     Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/robot")).unwrap()
@@ -64,7 +40,7 @@ fn the_control_step_allocates_nothing() {
     let mut state = State::at_rest(stand());
     let mut output = WbcOutput::hold(state.position);
 
-    let mut counted = 0;
+    let mut allocated = 0;
     for step in 0..2000_u32 {
         // Sways through all contact patterns, and far enough for the friction pyramid to act.
         let phase = f64::from(step) * 0.01;
@@ -85,12 +61,10 @@ fn the_control_step_allocates_nothing() {
             _ => ContactSet::without(Leg::FrontLeft).with_share(Leg::RearLeft, 0.0),
         };
 
-        let before = ALLOCATIONS.get();
-        sut.step(&model, &state, &objectives, &contacts, &mut output);
-        counted += ALLOCATIONS.get() - before;
+        allocated += counted(|| sut.step(&model, &state, &objectives, &contacts, &mut output)).1;
         assert_eq!(output.status.fault, None);
     }
-    assert_eq!(counted, 0);
+    assert_eq!(allocated, 0);
 }
 
 /// The torso leans to where limits stop it, the hand turns until a detour takes it the other way round.
@@ -116,17 +90,18 @@ fn reaching_allocates_nothing_also_at_limits_and_on_a_detour() {
     let mut reach = Reach::new(Side::Right, &joints, limits.reach);
     let gripper = at(Frame::Gripper(Side::Right));
 
-    let (mut counted, mut detours, mut held_back) = (0, 0, 0.0_f64);
+    let (mut allocated, mut detours, mut held_back) = (0, 0, 0.0_f64);
     for step in 0..6000_u32 {
         let share = (f64::from(step) / 2000.0).min(1.0);
         let lean = Isometry3::new(Vector3::new(0.1, 0.0, 0.1) * share, Vector3::new(0.0, 0.5, 0.0) * share);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 4.5 * share);
-        let before = ALLOCATIONS.get();
-        let torso = torso_reach.nearest(&model, &footing, &lean, DT_S);
-        let ground = Ground::at(ground_m, &Isometry3::identity());
-        reach.nearest(&model, &joints, &ground, &(gripper * turn), DT_S);
-        let detour = reach.detour(&model);
-        counted += ALLOCATIONS.get() - before;
+        let ((torso, detour), taken) = counted(|| {
+            let torso = torso_reach.nearest(&model, &footing, &lean, DT_S);
+            let ground = Ground::at(ground_m, &Isometry3::identity());
+            reach.nearest(&model, &joints, &ground, &(gripper * turn), DT_S);
+            (torso, reach.detour(&model))
+        });
+        allocated += taken;
         held_back = held_back.max((torso.translation.vector - lean.translation.vector).norm());
         detours += u32::from(detour.is_some());
         for (joint, angle) in Side::Right.limb_joints().into_iter().zip(reach.limb().iter()) {
@@ -134,5 +109,5 @@ fn reaching_allocates_nothing_also_at_limits_and_on_a_detour() {
         }
     }
     assert!(detours > 100 && held_back > 0.01, "{detours} {held_back}");
-    assert_eq!(counted, 0);
+    assert_eq!(allocated, 0);
 }

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic in a test is the report")]
 
+#[path = "../../tests/shared/counting_allocator.rs"]
+mod counting_allocator;
 mod session;
 
-use std::{
-    alloc::{GlobalAlloc, Layout, System},
-    cell::Cell,
-};
-
+use counting_allocator::counted;
 use locoman_robot::{
     control::Inputs,
     joints::Side,
@@ -17,30 +15,6 @@ use locoman_robot::{
 };
 use nalgebra::Isometry3;
 use session::Session;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting what each thread asks for.
-struct Counting;
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises are those of the system's allocator.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// Runs for a while with the operator as he is; returns what the control steps allocated.
 fn allocations(session: &mut Session, seconds: f64) -> usize {
@@ -53,9 +27,9 @@ fn allocations(session: &mut Session, seconds: f64) -> usize {
             operator.sequence += 1;
         }
         let inputs = Inputs { command: session.operator, ..Inputs::default() };
-        let before = ALLOCATIONS.get();
-        session.command = session.controller.tick(sensors.time_ns, &sensors, &inputs);
-        allocated += ALLOCATIONS.get() - before;
+        let taken;
+        (session.command, taken) = counted(|| session.controller.tick(sensors.time_ns, &sensors, &inputs));
+        allocated += taken;
     }
     allocated
 }

@@ -2,9 +2,12 @@
 
 #![expect(clippy::expect_used, reason = "helpers of tests: a panic there is the report")]
 
+mod corners;
+
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
+use corners::Comparison;
 use locoman_protocol::messages::Tracking;
 use locoman_protocol::recording::{Reader, camera_of_image_topic};
 use locoman_sim::operator::motion::{Body, Motion};
@@ -12,8 +15,6 @@ use locoman_sim::operator::output::Output;
 use locoman_sim::operator::scene::Scene;
 use locoman_sim::operator::studio::Studio;
 use locoman_sim::operator::{Formats, Inputs, Schedule, create_recording, render_to};
-use locoman_vision::detect::{Detector, Search};
-use locoman_vision::image::GrayImage;
 
 fn inputs() -> Inputs {
     Inputs::standard(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs"))
@@ -31,33 +32,15 @@ fn motion() -> Motion {
 fn the_detector_finds_corners_where_the_truth_projects_them() {
     /// Half-pixel mistakes give 0.5 px and mirrored tags none at all; the detector itself has 0.02 px.
     const MOST_RMS_PX: f64 = 0.1;
-    const LEAST_SIDE_PX: f64 = 30.0;
     let sut = studio();
-    let ids: Vec<u32> =
-        sut.solids().iter().flat_map(|s| &s.facets).flat_map(|f| &f.tags).map(|tag| tag.id).collect();
-    let mut detector = Detector::new(&ids).expect("ids of the family");
-    let (mut squares, mut corners, mut missed) = (0.0, 0, 0);
-    for (frame, t_s) in [0.0, 6.0, 13.0].into_iter().enumerate() {
+    let mut comparison = Comparison::new(&sut);
+    for (frame, t_s) in (0..).zip([0.0, 6.0, 13.0]) {
         for camera in 0..sut.cameras().len() {
-            let picture = sut.picture(camera, t_s, frame as u64);
-            let image = GrayImage::new(picture.width, picture.height, picture.grey).expect("size");
-            let found = detector.detect(&image, Search::Full { decimate: 1.0 });
-            for truth in sut.sightings(camera, t_s) {
-                if !truth.is_readable() || truth.side_px < LEAST_SIDE_PX {
-                    continue;
-                }
-                let Some(tag) = found.iter().find(|tag| tag.id == truth.id) else {
-                    missed += 1;
-                    continue;
-                };
-                for (a, b) in tag.corners_px.iter().zip(&truth.corners_px) {
-                    squares += (a - b).norm_squared();
-                    corners += 2;
-                }
-            }
+            comparison.look(&sut, camera, t_s, frame, |_| true);
         }
     }
-    let rms_px = (squares / f64::from(corners)).sqrt();
+    let Comparison { coordinates: corners, missed, .. } = comparison;
+    let rms_px = comparison.rms_px();
     println!("{corners} corner coordinates, RMS {rms_px:.4} px, {missed} tags missed");
     assert!(corners > 400, "only {corners} corner coordinates seen");
     assert!(rms_px < MOST_RMS_PX, "{rms_px} px");

@@ -3,17 +3,18 @@
 
 #![expect(clippy::expect_used, reason = "helpers of tests: a panic there is the report")]
 
+mod corners;
+
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use corners::Comparison;
 use locoman_protocol::messages::Tracking;
 use locoman_protocol::recording::{Reader, camera_of_image_topic};
 use locoman_sim::operator::motion::Body;
 use locoman_sim::operator::output::Output;
 use locoman_sim::operator::studio::Studio;
 use locoman_sim::operator::{FIRST_CAPTURE_NS, Formats, Inputs, Schedule, create_recording, render_to};
-use locoman_vision::detect::{Detection, Detector, Search};
-use locoman_vision::image::GrayImage;
 use nalgebra::{Isometry3, Point2, Point3};
 
 const ROLLING: &str = "two_zed_pairs_rolling_720p.toml";
@@ -31,47 +32,24 @@ fn studio(rig: &str, scene: &str) -> Studio {
     inputs(rig, scene).studio(1).expect("the committed files are good")
 }
 
-fn detect(detector: &mut Detector, sut: &Studio, camera: usize, t_s: f64) -> Vec<Detection> {
-    let picture = sut.picture(camera, t_s, 0);
-    let image = GrayImage::new(picture.width, picture.height, picture.grey).expect("size");
-    detector.detect(&image, Search::Full { decimate: 1.0 })
-}
-
-fn ids(sut: &Studio) -> Vec<u32> {
-    sut.solids().iter().flat_map(|s| &s.facets).flat_map(|f| &f.tags).map(|tag| tag.id).collect()
-}
-
 #[test]
 fn a_fast_shell_shows_its_corners_where_its_own_rows_see_them() {
     /// The detector has 0.02 px at rest; 1.4 px of motion blur add little.
     const MOST_RMS_PX: f64 = 0.1;
     /// Tags that move by more than this from where they are at the capture time show that rows matter.
     const LEAST_SHIFT_PX: f64 = 3.0;
-    const LEAST_SIDE_PX: f64 = 30.0;
     let sut = studio(ROLLING, "fast.toml");
-    let mut detector = Detector::new(&ids(&sut)).expect("ids of the family");
-    let (mut squares, mut corners, mut missed, mut most_shift_px) = (0.0, 0, 0, 0.0f64);
+    let (mut comparison, mut most_shift_px) = (Comparison::new(&sut), 0.0f64);
     for t_s in [4.1, 4.4, 7.3] {
         for camera in 0..sut.cameras().len() {
-            let found = detect(&mut detector, &sut, camera, t_s);
-            for truth in sut.sightings(camera, t_s) {
-                if !truth.is_readable() || truth.side_px < LEAST_SIDE_PX || truth.body == Body::Torso {
-                    continue;
-                }
-                let Some(tag) = found.iter().find(|tag| tag.id == truth.id) else {
-                    missed += 1;
-                    continue;
-                };
-                for (a, b) in tag.corners_px.iter().zip(&truth.corners_px) {
-                    squares += (a - b).norm_squared();
-                    corners += 2;
-                }
+            for truth in comparison.look(&sut, camera, t_s, 0, |tag| tag.body != Body::Torso) {
                 let at_capture = global_sighting(&sut, camera, t_s, truth.id);
                 most_shift_px = most_shift_px.max((at_capture - truth.corners_px[0]).norm());
             }
         }
     }
-    let rms_px = (squares / f64::from(corners)).sqrt();
+    let Comparison { coordinates: corners, missed, .. } = comparison;
+    let rms_px = comparison.rms_px();
     println!(
         "{corners} corner coordinates, RMS {rms_px:.4} px, {missed} missed, rows shift by {most_shift_px:.1} px"
     );

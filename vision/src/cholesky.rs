@@ -3,13 +3,7 @@
 //! nalgebra has the same; this runs over whole rows, which the compiler makes vectors of, and takes a third of the
 //! time, and half of that with AVX2. It is what the fit of each tag and each step of a pose wait for.
 
-#![cfg_attr(
-    target_arch = "x86_64",
-    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
-)]
-
-#[cfg(target_arch = "x86_64")]
-use crate::vector::has_avx2;
+use crate::vector::{Kernel, Vector, fastest};
 
 /// The decomposition of a positive definite matrix.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,34 +75,38 @@ impl<const N: usize> Cholesky<N> {
 
     /// [`Cholesky::new`] as fast as the processor can.
     pub fn of(matrix: &[[f64; N]; N]) -> Option<Self> {
-        #[cfg(target_arch = "x86_64")]
-        if has_avx2() {
-            // SAFETY: the processor has what it is compiled for.
-            return unsafe { Self::of_avx2(matrix) };
-        }
-        Self::new(*matrix)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn of_avx2(matrix: &[[f64; N]; N]) -> Option<Self> {
-        Self::new(*matrix)
+        fastest(Decomposition(matrix))
     }
 
     /// Products of columns of [`Cholesky::whitened`] rows: RᵀA⁻¹R, as fast as the processor can.
     pub fn whitened_products<const M: usize>(&self, rows: &[[f64; M]; N], into: &mut [[f64; M]; M]) {
-        #[cfg(target_arch = "x86_64")]
-        if has_avx2() {
-            // SAFETY: the processor has what it is compiled for.
-            return unsafe { self.whitened_products_avx2(rows, into) };
-        }
-        *into = products(&self.whitened(*rows));
+        fastest(WhitenedProducts { of: self, rows, into });
     }
+}
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn whitened_products_avx2<const M: usize>(&self, rows: &[[f64; M]; N], into: &mut [[f64; M]; M]) {
-        *into = products(&self.whitened(*rows));
+struct Decomposition<'a, const N: usize>(&'a [[f64; N]; N]);
+
+impl<const N: usize> Kernel for Decomposition<'_, N> {
+    type Output = Option<Cholesky<N>>;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Self::Output {
+        Cholesky::new(*self.0)
+    }
+}
+
+struct WhitenedProducts<'a, const N: usize, const M: usize> {
+    of: &'a Cholesky<N>,
+    rows: &'a [[f64; M]; N],
+    into: &'a mut [[f64; M]; M],
+}
+
+impl<const N: usize, const M: usize> Kernel for WhitenedProducts<'_, N, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        *self.into = products(&self.of.whitened(*self.rows));
     }
 }
 

@@ -85,9 +85,8 @@ impl ShellSet {
 
     /// The palm that a thumb is on, by their names; `None` for every other shell.
     pub fn palm_of(&self, shell: usize) -> Option<usize> {
-        let name = &self.shells.get(shell)?.name;
-        let palm = name.strip_suffix("thumb").map(|side| format!("{side}palm"))?;
-        self.shell_index(&palm)
+        let side = self.shells.get(shell)?.name.strip_suffix("thumb")?;
+        self.shells.iter().position(|other| other.name.strip_suffix("palm") == Some(side))
     }
 
     fn from_source(source: &Source) -> Result<Self, ConfigError> {

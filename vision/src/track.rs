@@ -7,7 +7,7 @@
 //!            one a camera: reads the tags    ├──► Fusion ──► TrackUpdate
 //!            where they are expected         │    solves each shell from all views at their own
 //!  image ──► Scout ──► CameraUpdate ─────────┘    times, filters, judges
-//!            the whole image, for what is lost
+//!            whole images for what is lost, regions for what the eye missed
 //! ```
 //!
 //! [`Tracker`] runs all of it on a set of frames, one after the other: deterministic, for recordings. A
@@ -81,6 +81,12 @@ impl Tracker {
 
     /// Takes in what cameras saw at about one instant.
     pub fn update(&mut self, frames: &FrameSet) -> TrackUpdate {
+        let seen = self.look(frames);
+        self.fuse(seen)
+    }
+
+    /// The first half of [`Tracker::update`]: what each camera's frame shows.
+    pub fn look(&mut self, frames: &FrameSet) -> Vec<CameraUpdate> {
         self.turn = self.turn.wrapping_add(1);
         let motions = self.fusion.motions();
         let time_ns = frames.time_ns();
@@ -88,8 +94,7 @@ impl Tracker {
         let lost = self.fusion.lost_at(time_ns);
         let everyone = lost && motions.nothing_known_at(time_ns);
         let turn = self.turn % self.eyes.len();
-        let seen: Vec<CameraUpdate> = self
-            .eyes
+        self.eyes
             .par_iter_mut()
             .zip(self.scouts.par_iter_mut())
             .enumerate()
@@ -98,7 +103,11 @@ impl Tracker {
                 let whole = everyone || (lost && turn == camera);
                 Some(look(eye, scout, whole, frame, &motions))
             })
-            .collect();
+            .collect()
+    }
+
+    /// The second half: what it says of the shells.
+    pub fn fuse(&mut self, seen: Vec<CameraUpdate>) -> TrackUpdate {
         self.fusion.update(seen)
     }
 

@@ -1,8 +1,7 @@
-//! Eight numbers side by side: the inner loops are written once over [`Vector`] and compiled twice, for every
-//! processor and for those with AVX2 and FMA, which takes half the time.
+//! Inner loops that are written once and compiled twice, for every processor and for those with AVX2 and FMA, which takes
+//! half the time: a [`Kernel`], which may compute with eight numbers side by side ([`Vector`]).
 //!
-//! What is compiled for AVX2 begins at a function with `#[target_feature]` that is called only after [`has_avx2`] has
-//! asked the processor, and is inlined into it as a whole.
+//! [`fastest`] asks the processor; a kernel is inlined as a whole into what is compiled for the answer.
 
 #![cfg_attr(
     target_arch = "x86_64",
@@ -18,6 +17,25 @@ use wide::{f32x8, i32x8};
 
 /// Numbers side by side.
 pub const LANES: usize = 8;
+
+/// Work that is worth compiling twice.
+pub trait Kernel {
+    /// What it computes.
+    type Output;
+
+    /// Does it. Must be `#[inline(always)]`, and all that it calls and that takes time: else that is compiled once only.
+    fn run<V: Vector>(self) -> Self::Output;
+}
+
+/// Runs a kernel as fast as this processor can.
+pub fn fastest<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if avx::is_there() {
+        // SAFETY: the processor has what it is compiled for.
+        return unsafe { avx::run(kernel) };
+    }
+    kernel.run::<f32x8>()
+}
 
 /// Eight numbers.
 pub trait Vector:
@@ -91,21 +109,23 @@ impl Vector for f32x8 {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use avx::{Avx, has_avx2};
-
-#[cfg(target_arch = "x86_64")]
 mod avx {
     use std::arch::x86_64 as arch;
 
-    use super::{Add, Div, LANES, Mul, Sub, Vector};
+    use super::{Add, Div, Kernel, LANES, Mul, Sub, Vector};
 
     /// Whether [`Avx`] may be used.
     #[inline]
-    pub fn has_avx2() -> bool {
+    pub fn is_there() -> bool {
         is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
     }
 
-    /// Eight numbers in one register. To be used only where [`has_avx2`] is true: what is `SAFETY` below rests on it.
+    #[target_feature(enable = "avx2,fma")]
+    pub fn run<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx>()
+    }
+
+    /// Eight numbers in one register. Used only where [`is_there`] is true: what is `SAFETY` below rests on it.
     #[derive(Debug, Clone, Copy)]
     pub struct Avx(arch::__m256);
 
@@ -231,10 +251,10 @@ mod tests {
     fn both_kinds_of_vectors_compute_the_same() {
         /// FMA rounds once where two operations round twice.
         const TOLERANCE: f32 = 1e-6;
-        if !has_avx2() {
+        if !avx::is_there() {
             return;
         }
-        let (sut, expected) = (results::<Avx>(), results::<f32x8>());
+        let (sut, expected) = (results::<avx::Avx>(), results::<f32x8>());
         for (sut, expected) in sut.iter().flatten().zip(expected.iter().flatten()) {
             assert!((sut - expected).abs() <= TOLERANCE * expected.abs(), "{sut} {expected}");
         }

@@ -17,6 +17,7 @@ use anyhow::{Context, Result};
 use locoman_vision::rig::Rig;
 use locoman_vision::shells::ShellSet;
 
+pub use plots::COLOURS;
 pub use summary::Summary;
 pub use tally::Tally;
 

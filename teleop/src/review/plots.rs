@@ -12,8 +12,8 @@ use super::tally::{CameraTally, Tally};
 
 /// Of one panel.
 const PANEL_PX: (u32, u32) = (560, 360);
-/// Blue, green, orange, magenta, grey: told apart by the colour-blind too.
-const COLOURS: [RGBColor; 5] = [
+/// Blue, green, orange, magenta, grey, for lines of any plot: told apart by the colour-blind too.
+pub const COLOURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(0, 150, 110),
     RGBColor(230, 120, 0),

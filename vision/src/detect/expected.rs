@@ -17,6 +17,7 @@ mod pattern;
 mod places;
 mod rays;
 mod sample;
+mod view;
 
 use std::collections::BTreeMap;
 
@@ -28,9 +29,9 @@ use crate::image::GrayImage;
 use align::Cells;
 use fit::{Appearance, Closeness, Fit, Samples};
 use pattern::{CORNERS, MIDDLE, Pattern};
-use places::{Local, Places};
 use rays::RayGrid;
-use sample::{Choice, Picked, Scene};
+use sample::{Choice, Picked};
+use view::View;
 
 /// Where a tag is expected.
 #[derive(Debug, Clone, Copy)]
@@ -83,8 +84,6 @@ pub enum Refusal {
     Misfit,
 }
 
-/// Tags with shorter sides than this are not read: their cells are smaller than 1.5 pixels.
-const LEAST_SIDE_PX: f64 = 12.0;
 /// White above black at least, grey levels.
 const LEAST_CONTRAST: f64 = 16.0;
 /// Residuals beyond this share of the contrast are no tag. Noise of 1 %, uneven light and print add to 5.
@@ -256,107 +255,6 @@ impl Desk<'_> {
             blur_px: [sigma_px(0), sigma_px(1)],
             wrong_cells,
         })
-    }
-}
-
-/// How a tag lies in the image.
-#[derive(Debug, Clone, Copy)]
-struct View {
-    local: Local,
-    /// By rows; the last number is 1.
-    cells_from_local: [f64; 9],
-    local_from_cells: Matrix3<f64>,
-    places: Places,
-    /// Outer corners of the white margin: (0, 0), (10, 0), (10, 10), (0, 10) in cells.
-    margin_px: [Point2<f64>; 4],
-    middle_px: Point2<f64>,
-    /// Length of the gradients of u and v in the image.
-    cells_per_px: [f64; 2],
-    /// Cosine of the angle between these gradients.
-    correlation: f64,
-    /// The shorter side of the black square.
-    side_px: f64,
-}
-
-/// The outer corners of the white margin.
-const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
-
-impl View {
-    fn new(camera: &Camera, ideal_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
-        let ideal = |[u, v]: [f64; 2]| {
-            let p = ideal_from_cells * Vector3::new(u, v, 1.0);
-            (p.z > 0.0).then(|| Vector2::new(p.x / p.z, p.y / p.z))
-        };
-        let origin = ideal([MIDDLE, MIDDLE]).ok_or(Refusal::Outside)?;
-        let [Some(a), Some(b), Some(c), Some(d)] = MARGIN.map(ideal) else { return Err(Refusal::Outside) };
-        let unit = [a, b, c, d].into_iter().map(|end| (end - origin).norm()).fold(0.0, f64::max);
-        let local = Local::new(camera, origin, unit);
-        let (inv_unit, moved) = (1.0 / unit, -origin / unit);
-        let local_from_ideal = Matrix3::new(inv_unit, 0.0, moved.x, 0.0, inv_unit, moved.y, 0.0, 0.0, 1.0);
-        Self::within(camera, &local, &(local_from_ideal * ideal_from_cells))
-    }
-
-    /// A tag in local coordinates that are already there.
-    fn within(camera: &Camera, local: &Local, local_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
-        let inverse = local_from_cells.try_inverse().ok_or(Refusal::Small)?;
-        let scale = 1.0 / inverse[(2, 2)];
-        let places = local.places(local_from_cells);
-        let margin_px = MARGIN.map(|[u, v]| places.pixel(u, v));
-        if !margin_px.iter().all(|corner| camera.contains(corner)) {
-            return Err(Refusal::Outside);
-        }
-        let [a, b, c, d] = margin_px;
-        let along_u = ((b - a) + (c - d)) / 20.0;
-        let along_v = ((d - a) + (c - b)) / 20.0;
-        let side_px = 8.0 * along_u.norm().min(along_v.norm());
-        let area = along_u.perp(&along_v);
-        if side_px < LEAST_SIDE_PX || area < 0.1 * along_u.norm() * along_v.norm() {
-            return Err(Refusal::Small);
-        }
-        Ok(Self {
-            local: *local,
-            cells_from_local: std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale),
-            local_from_cells: *local_from_cells,
-            places,
-            margin_px,
-            middle_px: places.pixel(MIDDLE, MIDDLE),
-            cells_per_px: [along_v.norm() / area, along_u.norm() / area],
-            // The gradient of u stands across the lines of equal u, which run along v; and the other way round.
-            correlation: -along_u.dot(&along_v) / (along_u.norm() * along_v.norm()),
-            side_px,
-        })
-    }
-
-    /// The same tag moved in the image.
-    fn shifted(&self, camera: &Camera, shift_px: Vector2<f64>) -> Result<Self, Refusal> {
-        let by_px = self.local.px_by_local.try_inverse().ok_or(Refusal::Small)?;
-        let shift = Matrix3::new_translation(&(by_px * shift_px));
-        Self::within(camera, &self.local, &(shift * self.local_from_cells))
-    }
-
-    /// The tag as it was fitted in this view's local coordinates.
-    fn fitted(&self, camera: &Camera, cells_from_local: &[f64; 9]) -> Result<Self, Refusal> {
-        let inverse = Matrix3::from_row_slice(cells_from_local).try_inverse().ok_or(Refusal::Misfit)?;
-        Self::within(camera, &self.local, &inverse)
-    }
-
-    /// What pixels are picked from.
-    fn scene<'a>(&self, image: &'a GrayImage, pattern: &'a Pattern) -> Scene<'a> {
-        /// What lies beyond the margin by more than this is none of the tag's.
-        const SPARE_PX: f64 = 2.0;
-        let bound = |axis: usize, fold: fn(f64, f64) -> f64, start: f64| {
-            self.margin_px.iter().map(|corner| corner[axis]).fold(start, fold)
-        };
-        let low = [0, 1].map(|axis| (bound(axis, f64::min, f64::INFINITY) - SPARE_PX) as i32);
-        let high = [0, 1].map(|axis| (bound(axis, f64::max, 0.0) + SPARE_PX) as i32);
-        Scene {
-            image,
-            pattern,
-            places: self.places,
-            local: self.local,
-            bounds_px: [low, high],
-            cells_per_px: self.cells_per_px,
-        }
     }
 }
 

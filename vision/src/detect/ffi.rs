@@ -1,4 +1,4 @@
-//! All unsafe code of this crate: the AprilTag C library.
+//! The AprilTag C library: with [`crate::vector`] all unsafe code of this crate.
 //!
 //! Each [`Engine`] owns one detector and one family; nothing of either is shared, so an engine may move
 //! between threads but is used by one at a time (`&mut self`).

@@ -5,19 +5,13 @@
 //! k grows with the lower median of s: while the start is far off, nothing fades. From the minimum that this leads
 //! to, it is bounded: then half of the tags may be false.
 
-#![cfg_attr(
-    target_arch = "x86_64",
-    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
-)]
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::state::{Matrix18, Prior, State, Vector18};
 use super::term::{BEHIND, Linear, RESIDUAL, Term, View};
 use super::{Fate, Observation, SolverSettings, Views};
 use crate::cholesky::Cholesky;
-#[cfg(target_arch = "x86_64")]
-use crate::vector::has_avx2;
+use crate::vector::{Kernel, Vector, fastest};
 
 /// Once a minimum is found, noise larger than promised is allowed for only up to this variance: what lies beyond is
 /// false, even if half of the tags are.
@@ -227,7 +221,7 @@ impl Workspace {
                 continue;
             }
             let factor = if *squared > limit { limit / squared } else { 1.0 };
-            add_powers(&mut sums, products, factor, term.dt_s);
+            fastest(AddPowers { sums: &mut sums, products, factor, dt_s: term.dt_s });
         }
         // From rotations about world axes to those about shell axes.
         let rotation = state.world_from_shell.rotation.to_rotation_matrix().into_inner();
@@ -297,31 +291,28 @@ impl Workspace {
 /// Sums of products, times dt to the power of 0 to 4.
 type PowerSums = [[[f64; 8]; 8]; 5];
 
-/// Adds products times a factor and powers of dt, as fast as the processor can.
-fn add_powers(sums: &mut PowerSums, products: &[[f64; 8]; 8], factor: f64, dt_s: f64) {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what it is compiled for.
-        return unsafe { add_powers_avx2(sums, products, factor, dt_s) };
-    }
-    add_powers_plainly(sums, products, factor, dt_s);
+/// Adds products, times a factor and the powers of dt.
+struct AddPowers<'a> {
+    sums: &'a mut PowerSums,
+    products: &'a [[f64; 8]; 8],
+    factor: f64,
+    dt_s: f64,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn add_powers_avx2(sums: &mut PowerSums, products: &[[f64; 8]; 8], factor: f64, dt_s: f64) {
-    add_powers_plainly(sums, products, factor, dt_s);
-}
+impl Kernel for AddPowers<'_> {
+    type Output = ();
 
-#[inline(always)]
-fn add_powers_plainly(sums: &mut PowerSums, products: &[[f64; 8]; 8], mut factor: f64, dt_s: f64) {
-    for sum in sums {
-        for (sum, row) in sum.iter_mut().zip(products).take(RESIDUAL) {
-            for (sum, value) in sum.iter_mut().zip(row) {
-                *sum += factor * value;
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let mut factor = self.factor;
+        for sum in self.sums {
+            for (sum, row) in sum.iter_mut().zip(self.products).take(RESIDUAL) {
+                for (sum, value) in sum.iter_mut().zip(row) {
+                    *sum += factor * value;
+                }
             }
+            factor *= self.dt_s;
         }
-        factor *= dt_s;
     }
 }
 

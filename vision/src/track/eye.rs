@@ -30,8 +30,9 @@ pub struct Eye {
     /// Memory for the motions at an image's time, and for the tags of one shell.
     motions: Vec<Option<Motion>>,
     expected: Vec<Expected>,
-    /// Tags that one image has shown at most.
+    /// Tags that one image has shown, and missed, at most.
     most_tags: usize,
+    most_missed: usize,
     /// Counts images: in every so many it is this camera's turn to have a region searched.
     images: usize,
     cameras: usize,
@@ -50,6 +51,7 @@ impl Eye {
             motions: Vec::new(),
             expected: Vec::new(),
             most_tags: 0,
+            most_missed: 0,
             images: index,
             cameras: rig.cameras.len(),
             wanted: None,
@@ -71,6 +73,7 @@ impl Eye {
         let mut update = CameraUpdate::nothing(self.index, capture_ns);
         // At once, so that nothing has to be copied from one place to another while it grows.
         update.tags.reserve(self.most_tags);
+        update.missed.reserve(self.most_missed);
         let mut sought: Option<Region> = None;
         for (shell, motion) in motions.iter().enumerate() {
             match motion {
@@ -93,6 +96,7 @@ impl Eye {
         self.wanted = sought;
         self.motions = motions;
         self.most_tags = self.most_tags.max(update.tags.len());
+        self.most_missed = self.most_missed.max(update.missed.len());
         update.detect_ns = nanoseconds(begun.elapsed());
         update
     }

@@ -1,5 +1,7 @@
 //! The whole chain on rendered images.
 
+mod allocation;
+
 use nalgebra::{Isometry3, Vector3};
 
 use super::*;

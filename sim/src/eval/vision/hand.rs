@@ -59,7 +59,7 @@ pub fn run(stage: &Stage, seconds: f64, trials: &mut [Trial]) -> anyhow::Result<
     let mut tracker = stage.tracker()?;
     film.show(|shot| {
         let shot = shot.decoded()?;
-        trials.iter_mut().try_for_each(|trial| trial.see(stage, &shot))?;
+        trials.iter_mut().for_each(|trial| trial.see(stage, &shot));
         let update = tracker.update(&shot.frames);
         outcome.now.add(&stage.studio, &shot, &update);
         let then_ns = update.time_ns + AHEAD_NS;

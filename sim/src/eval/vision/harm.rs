@@ -4,10 +4,7 @@
 //! moment. A jump is the change of a pose's error from one measured pose to the next within a tenth of a second: what
 //! the hand itself does is not one.
 
-use locoman_vision::image::GrayImage;
-use locoman_vision::track::{
-    CameraUpdate, Eye, Fusion, Scout, SeenTag, TrackUpdate, TrackerSettings, Verdict,
-};
+use locoman_vision::track::{CameraUpdate, SeenTag, TrackUpdate, Tracker, Verdict};
 use nalgebra::Vector2;
 
 use super::error::PoseError;
@@ -49,10 +46,7 @@ pub const HARMS: [Harm; 4] = [
 #[derive(Debug)]
 pub struct Trial {
     harm: Harm,
-    eyes: Vec<Eye>,
-    scouts: Vec<Scout>,
-    fusion: Fusion,
-    turn: usize,
+    tracker: Tracker,
     random: u64,
     tally: Tally,
     shells: Vec<Course>,
@@ -76,17 +70,10 @@ type Good = Vec<usize>;
 impl Trial {
     /// Nothing was seen yet.
     pub fn new(stage: &Stage, harm: Harm, seed: u64) -> anyhow::Result<Self> {
-        let settings = TrackerSettings::default();
-        let (rig, shells) = (&stage.rig, &stage.shells);
-        let cameras = 0..rig.cameras.len();
-        let eyes = cameras.clone().map(|camera| Eye::new(rig, camera, shells, &settings));
-        let scouts = cameras.map(|camera| Scout::new(rig, camera, shells, &settings));
+        let shells = &stage.shells;
         Ok(Self {
             harm,
-            eyes: eyes.collect(),
-            scouts: scouts.collect::<Result<_, _>>()?,
-            fusion: Fusion::new(rig.clone(), shells.clone(), settings),
-            turn: 0,
+            tracker: stage.tracker()?,
             random: mix(seed),
             tally: Tally::new(shells),
             shells: vec![Course::default(); shells.shells.len()],
@@ -94,10 +81,10 @@ impl Trial {
     }
 
     /// Looks at a moment, and compares what comes of it with the truth.
-    pub fn see(&mut self, stage: &Stage, shot: &Shot) -> anyhow::Result<()> {
+    pub fn see(&mut self, stage: &Stage, shot: &Shot) {
         /// Scene time until which shells are being found.
         const SETTLED_S: f64 = 2.0;
-        let (update, good) = self.update(shot)?;
+        let (update, good) = self.update(shot);
         self.tally.add(&stage.studio, shot, &update);
         let truth = truth_at(&stage.studio, update.time_ns);
         let time_s = scene_s(update.time_ns);
@@ -113,31 +100,14 @@ impl Trial {
                 course.add(PoseError::new(time_s, truth.of(body), found), settled);
             }
         }
-        Ok(())
     }
 
-    /// As the tracker does it, with harm in between; also the shells of all tags that were left as they are.
-    fn update(&mut self, shot: &Shot) -> anyhow::Result<(TrackUpdate, Good)> {
-        self.turn = self.turn.wrapping_add(1);
-        let motions = self.fusion.motions();
-        let time_ns = shot.frames.time_ns();
-        let lost = self.fusion.lost_at(time_ns);
-        let everyone = lost && motions.nothing_known_at(time_ns);
-        let turn = self.turn % self.eyes.len();
-        let (mut seen, mut good): (Vec<CameraUpdate>, Good) = (Vec::new(), Vec::new());
-        for frame in &shot.frames.frames {
-            let image: GrayImage = frame.pixels.to_gray()?.into_owned();
-            let (eye, scout) = (&mut self.eyes[frame.camera], &mut self.scouts[frame.camera]);
-            let mut update = eye.look(&image, frame.capture_ns, &motions);
-            let whole = everyone || (lost && turn == frame.camera);
-            let region = eye.wanted().filter(|_| !whole);
-            if whole || region.is_some() {
-                scout.add_to(&mut update, eye, &image, region);
-            }
-            good.extend(self.harm.spoil(&mut update.tags, &mut self.random));
-            seen.push(update);
-        }
-        Ok((self.fusion.update(seen), good))
+    /// The update with harm in it; also the shells of all tags that were left as they are.
+    fn update(&mut self, shot: &Shot) -> (TrackUpdate, Good) {
+        let mut seen = self.tracker.look(&shot.frames);
+        let spoil = |camera: &mut CameraUpdate| self.harm.spoil(&mut camera.tags, &mut self.random);
+        let good = seen.iter_mut().flat_map(spoil).collect();
+        (self.tracker.fuse(seen), good)
     }
 
     /// What happens to tags.

@@ -3,20 +3,13 @@
 use std::path::Path;
 
 use anyhow::Context;
+use locoman_teleop::review::COLOURS;
 use plotters::prelude::*;
 
 use super::error::PoseError;
 use super::tally::{ShellTally, Tally};
 
 const SIZE_PX: (u32, u32) = (1000, 640);
-/// One a shell, told apart by people who see few colours too.
-const COLOURS: [RGBColor; 5] = [
-    RGBColor(0, 0, 0),
-    RGBColor(230, 120, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(204, 70, 140),
-    RGBColor(0, 150, 110),
-];
 /// Longer pauses than this are gaps in a line.
 const GAP_S: f64 = 0.2;
 

@@ -9,7 +9,8 @@ use wide::f32x8;
 
 use super::pattern::{BLACK_CELLS, EIGHTS, Pattern};
 use super::places::greys;
-use super::{LEAST_CONTRAST, Refusal, View};
+use super::view::View;
+use super::{LEAST_CONTRAST, Refusal};
 use crate::image::GrayImage;
 use crate::vector::LANES;
 

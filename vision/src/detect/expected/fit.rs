@@ -18,21 +18,14 @@
 //! The covariance of G is the inverse of the normal matrix times the variance of the residuals (Triggs et al.,
 //! "Bundle adjustment: a modern synthesis", 1999, section 2).
 
-#![cfg_attr(
-    target_arch = "x86_64",
-    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
-)]
-
 mod lanes;
 
 pub use lanes::Pixels;
 use lanes::{Derivatives, KERNEL_VARIANCE, Picture};
 
-use wide::f32x8;
-
 use super::START_BLUR_PX;
 use crate::cholesky::{self, Cholesky};
-use crate::vector::{self, Vector};
+use crate::vector::{Kernel, Vector, fastest};
 
 /// Unknowns: β, γ, h_u, h_v, then eight of G.
 const UNKNOWNS: usize = 12;
@@ -122,18 +115,7 @@ impl Samples {
     /// Fits from a start that is right within half the reach of the blur; `None` where it leads nowhere. `known` has
     /// the blur that is believed beforehand.
     pub fn fit(&mut self, start: &Appearance, known: &Appearance, closeness: &Closeness) -> Option<Fit> {
-        #[cfg(target_arch = "x86_64")]
-        if vector::has_avx2() {
-            // SAFETY: the processor has what it is compiled for.
-            return unsafe { self.fit_avx2(start, known, closeness) };
-        }
-        self.fit_with::<f32x8>(start, known, closeness)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn fit_avx2(&mut self, start: &Appearance, known: &Appearance, closeness: &Closeness) -> Option<Fit> {
-        self.fit_with::<vector::Avx>(start, known, closeness)
+        fastest(Fitting { samples: self, start, known, closeness })
     }
 
     #[inline(always)]
@@ -181,6 +163,22 @@ impl Samples {
             mixed: (appearance.correlation * h_u * h_v * KERNEL_VARIANCE) as f32,
         };
         lanes::products::<V>(&self.pixels, &picture, &mut self.derivatives)
+    }
+}
+
+struct Fitting<'a> {
+    samples: &'a mut Samples,
+    start: &'a Appearance,
+    known: &'a Appearance,
+    closeness: &'a Closeness,
+}
+
+impl Kernel for Fitting<'_> {
+    type Output = Option<Fit>;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Option<Fit> {
+        self.samples.fit_with::<V>(self.start, self.known, self.closeness)
     }
 }
 

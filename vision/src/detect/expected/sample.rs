@@ -3,19 +3,12 @@
 //! They lie where the grey level changes most: beside the edges, no farther than the blur reaches. As many are picked
 //! of each tag, evenly along all its edges, so that reading a tag takes about the same time whatever its size.
 
-#![cfg_attr(
-    target_arch = "x86_64",
-    expect(unsafe_code, reason = "calls what was compiled for AVX2 after asking the processor for it")
-)]
-
-use wide::f32x8;
-
 use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
 use super::places::{self, Local, Places};
 use super::rays::RayGrid;
 use crate::image::GrayImage;
-use crate::vector::{self, LANES, Vector};
+use crate::vector::{Kernel, LANES, Vector, fastest};
 
 /// Not so close to the end of the white margin, cells: what lies beyond is unknown.
 const BORDER: f32 = 0.35;
@@ -101,79 +94,68 @@ pub fn pick(
 ) {
     picked.clear(scene.bounds_px);
     samples.clear();
-    #[cfg(target_arch = "x86_64")]
-    if vector::has_avx2() {
-        // SAFETY: the processor has what it is compiled for.
-        return unsafe { pick_avx2(scene, rays, appearance, choice, picked, samples) };
-    }
-    pick_with::<f32x8>(scene, rays, appearance, choice, picked, samples);
+    fastest(Picking { scene, rays, appearance, choice, picked, samples });
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn pick_avx2(
-    scene: &Scene<'_>,
-    rays: &RayGrid,
-    appearance: &Appearance,
-    choice: &Choice,
-    picked: &mut Picked,
-    samples: &mut Samples,
-) {
-    pick_with::<vector::Avx>(scene, rays, appearance, choice, picked, samples);
+struct Picking<'a> {
+    scene: &'a Scene<'a>,
+    rays: &'a RayGrid,
+    appearance: &'a Appearance,
+    choice: &'a Choice,
+    picked: &'a mut Picked,
+    samples: &'a mut Samples,
 }
 
-#[inline(always)]
-fn pick_with<V: Vector>(
-    scene: &Scene<'_>,
-    rays: &RayGrid,
-    appearance: &Appearance,
-    choice: &Choice,
-    picked: &mut Picked,
-    samples: &mut Samples,
-) {
-    let reach: [f32; 2] = std::array::from_fn(|axis| {
-        let blur = choice.blur_share * appearance.blur_cells[axis];
-        (blur + choice.spare_px * scene.cells_per_px[axis]) as f32
-    });
-    let (reach_u, reach_v) = (V::splat(reach[0]), V::splat(reach[1]));
-    let cells_from_local = appearance.cells_from_local.map(|value| value as f32);
-    let inv_unit = V::splat((1.0 / scene.local.unit) as f32);
-    let origin_x = V::splat(scene.local.origin.x as f32);
-    let origin_y = V::splat(scene.local.origin.y as f32);
-    let end = CELLS as f32 - BORDER;
-    let image = scene.image;
-    // Whole numbers up to 16 million are exact.
-    let width = V::splat(image.width() as f32);
-    let turns = (0..choice.turns).map(|turn| turn as f32 / choice.turns as f32);
-    let all = turns.flat_map(|turn| scene.pattern.spots(choice.stride).map(move |spots| (turn, spots)));
-    for (turn, spots) in all {
-        // From −1 to 1, and on from −1.
-        let share = V::new(spots.aside) + V::splat(turn);
-        let aside = (share - share.floor()).times_plus(V::splat(2.0), V::splat(-1.0));
-        let u = (aside * reach_u).times_plus(V::new(spots.normal_u), V::new(spots.u));
-        let v = (aside * reach_v).times_plus(V::new(spots.normal_v), V::new(spots.v));
-        let [x, y] = scene.places.pixels(u, v);
-        let (x, y) = (places::nearest(x, image.width()), places::nearest(y, image.height()));
-        let (places, bits) = (y.times_plus(width, x).whole(), picked.places(x, y));
-        let mut pixels = Pixels::default();
-        for lane in 0..LANES {
-            pixels.grey[lane] = f32::from(image.data()[places[lane] as usize]);
-            pixels.weight[lane] = f32::from(u8::from(picked.first_time(bits[lane])));
+impl Kernel for Picking<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { scene, rays, appearance, choice, picked, samples } = self;
+        let reach: [f32; 2] = std::array::from_fn(|axis| {
+            let blur = choice.blur_share * appearance.blur_cells[axis];
+            (blur + choice.spare_px * scene.cells_per_px[axis]) as f32
+        });
+        let (reach_u, reach_v) = (V::splat(reach[0]), V::splat(reach[1]));
+        let cells_from_local = appearance.cells_from_local.map(|value| value as f32);
+        let inv_unit = V::splat((1.0 / scene.local.unit) as f32);
+        let origin_x = V::splat(scene.local.origin.x as f32);
+        let origin_y = V::splat(scene.local.origin.y as f32);
+        let end = CELLS as f32 - BORDER;
+        let image = scene.image;
+        // Whole numbers up to 16 million are exact.
+        let width = V::splat(image.width() as f32);
+        let turns = (0..choice.turns).map(|turn| turn as f32 / choice.turns as f32);
+        let all = turns.flat_map(|turn| scene.pattern.spots(choice.stride).map(move |spots| (turn, spots)));
+        for (turn, spots) in all {
+            // From −1 to 1, and on from −1.
+            let share = V::new(spots.aside) + V::splat(turn);
+            let aside = (share - share.floor()).times_plus(V::splat(2.0), V::splat(-1.0));
+            let u = (aside * reach_u).times_plus(V::new(spots.normal_u), V::new(spots.u));
+            let v = (aside * reach_v).times_plus(V::new(spots.normal_v), V::new(spots.v));
+            let [x, y] = scene.places.pixels(u, v);
+            let (x, y) = (places::nearest(x, image.width()), places::nearest(y, image.height()));
+            let (places, bits) = (y.times_plus(width, x).whole(), picked.places(x, y));
+            let mut pixels = Pixels::default();
+            for lane in 0..LANES {
+                pixels.grey[lane] = f32::from(image.data()[places[lane] as usize]);
+                pixels.weight[lane] = f32::from(u8::from(picked.first_time(bits[lane])));
+            }
+            let [ray_x, ray_y] = rays.at(x, y);
+            let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
+            let (u, v) = places::mapped(&cells_from_local, x, y);
+            let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
+            pixels.weight = (V::new(pixels.weight) * inside).to_array();
+            let (column, row) = (u.bounded(BORDER, end).floor(), v.bounded(BORDER, end).floor());
+            let cells = row.times_plus(V::splat(CELLS as f32), column).whole();
+            pixels.x = x.to_array();
+            pixels.y = y.to_array();
+            pixels.column = column.to_array();
+            pixels.row = row.to_array();
+            for lane in 0..LANES {
+                pixels.around[lane] = i32::from(scene.pattern.around(cells[lane] as usize));
+            }
+            samples.push(pixels);
         }
-        let [ray_x, ray_y] = rays.at(x, y);
-        let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
-        let (u, v) = places::mapped(&cells_from_local, x, y);
-        let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
-        pixels.weight = (V::new(pixels.weight) * inside).to_array();
-        let (column, row) = (u.bounded(BORDER, end).floor(), v.bounded(BORDER, end).floor());
-        let cells = row.times_plus(V::splat(CELLS as f32), column).whole();
-        pixels.x = x.to_array();
-        pixels.y = y.to_array();
-        pixels.column = column.to_array();
-        pixels.row = row.to_array();
-        for lane in 0..LANES {
-            pixels.around[lane] = i32::from(scene.pattern.around(cells[lane] as usize));
-        }
-        samples.push(pixels);
     }
 }

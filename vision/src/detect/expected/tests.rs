@@ -86,11 +86,11 @@ fn corners_are_right_within_a_hundredth_of_a_pixel() {
 }
 
 #[test]
-fn corners_of_a_tag_that_moves_while_it_is_exposed_are_right_within_a_fifth_of_a_pixel() {
-    // Eight pixels are as much as a cell: its edges flow into each other.
+fn corners_of_a_tag_that_moves_by_a_cell_while_it_is_exposed_are_right_within_a_seventh_of_a_pixel() {
+    // The edges flow into each other.
     let Outcome { rms_px, refused, .. } = measure(64.0, 20.0, 8.0, 6);
     assert_eq!(refused, 0);
-    assert!(rms_px < 0.2, "{rms_px} px");
+    assert!(rms_px < 0.14, "{rms_px} px");
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn corners_found_by_a_search_are_as_good_a_start_as_a_pose() {
     let found = picture.corners_px().map(|corner| corner + Vector2::new(0.2, -0.15));
     let start = Expectation::from_corners(picture.id, &picture.camera, &found, 2.0).expect("a square");
     let from_corners = sut.read(&image, &start).expect("there");
-    // Which pixels are picked depends a little on the start: by less than half of what noise does.
+    // Which pixels are picked depends a little on the start: by less than a third of what noise does.
     for (k, (a, b)) in from_pose.corners_px.iter().zip(&from_corners.corners_px).enumerate() {
         let variance = from_pose.covariance_px2.fixed_view::<2, 2>(2 * k, 2 * k).trace();
-        assert!((a - b).norm() < 0.5 * variance.sqrt(), "{a} {b}");
+        assert!((a - b).norm() < variance.sqrt() / 3.0, "{a} {b}");
     }
 }
