@@ -38,6 +38,12 @@ pub enum Rejection {
         /// As received.
         value: f64,
     },
+    /// A speed that is no number.
+    #[error("a speed to walk at is {value}")]
+    Velocity {
+        /// As received.
+        value: f64,
+    },
     /// A mode that this version does not know, or none although one is asked for.
     #[error("mode {0} is not known")]
     Mode(i32),
@@ -77,6 +83,12 @@ pub fn validate(command: &OperatorCommand) -> Result<(), Rejection> {
         ("left palm", &command.left_palm),
     ])?;
     check_openings([("right opening", command.right_opening), ("left opening", command.left_opening)])?;
+    if let Some(walk) = &command.walk {
+        let speeds = [walk.forward_m_s, walk.left_m_s, walk.turn_rad_s];
+        if let Some(value) = speeds.into_iter().find(|value| !value.is_finite()) {
+            return Err(Rejection::Velocity { value });
+        }
+    }
     let mode = Mode::try_from(command.mode).map_err(|_| Rejection::Mode(command.mode))?;
     if command.mode_request_id != 0 && mode == Mode::Unspecified {
         return Err(Rejection::Mode(command.mode));

@@ -14,6 +14,7 @@ pub mod estimator;
 pub mod joints;
 pub mod kinematics;
 pub mod link;
+pub mod locomotion;
 pub mod model;
 pub mod modes;
 pub mod plant;

@@ -4,9 +4,9 @@ use locoman_protocol::{
     geometry::isometry,
     messages::{self, OperatorCommand},
 };
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector2};
 
-use crate::{modes::Mode, trajectory::Trajectory};
+use crate::{locomotion::Velocity, modes::Mode, trajectory::Trajectory};
 
 /// One uninterrupted engagement of one sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +49,8 @@ pub struct Command {
     pub mode_request: u64,
     /// The mode of that request.
     pub mode: Option<Mode>,
+    /// How to walk; without it the torso's displacement says so.
+    pub walk: Option<Velocity>,
     /// What the engagement plays from its beginning, in place of the displacements.
     pub trajectory: Option<Trajectory>,
 }
@@ -67,6 +69,7 @@ impl Command {
             opening: [None; 2],
             mode_request: 0,
             mode: None,
+            walk: None,
             trajectory: None,
         }
     }
@@ -86,6 +89,10 @@ impl Command {
             opening: [message.right_opening, message.left_opening],
             mode_request: message.mode_request_id,
             mode: Mode::from_message(message.mode()),
+            walk: message.walk.map(|walk| Velocity {
+                linear: Vector2::new(walk.forward_m_s, walk.left_m_s),
+                turn: walk.turn_rad_s,
+            }),
             trajectory: message.trajectory.as_ref().and_then(Trajectory::from_message),
         }
     }

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
-use crate::joints::Side;
+use super::command::Command;
+use crate::{joints::Side, locomotion::Velocity};
 
 /// A symmetric or lopsided range.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -100,6 +101,40 @@ impl LimbRange {
     }
 }
 
+/// What the operator may ask of a robot that walks.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WalkingLimits {
+    /// The torso about its course: z is its height above the ground.
+    pub torso: TorsoRange,
+    /// Displacements of the torso along the ground that mean nothing, m.
+    pub dead_zone_m: f64,
+    /// The same for turning, rad.
+    pub dead_zone_rad: f64,
+    /// Speed for each metre beyond, 1/s.
+    pub speed_per_m: f64,
+    /// Turn rate for each radian beyond, 1/s.
+    pub turn_per_rad: f64,
+}
+
+impl WalkingLimits {
+    /// How a command asks to walk: by a velocity, or by how far the torso leaves its place, as a stick does.
+    pub fn velocity(&self, command: &Command) -> Velocity {
+        if let Some(walk) = command.walk {
+            return walk;
+        }
+        let Some(torso) = &command.torso else { return Velocity::default() };
+        let moved = torso.translation.vector.xy();
+        let beyond = (moved.norm() - self.dead_zone_m).max(0.0);
+        let (_, _, yaw) = torso.rotation.euler_angles();
+        let turned = yaw - yaw.clamp(-self.dead_zone_rad, self.dead_zone_rad);
+        Velocity {
+            linear: moved.try_normalize(1e-9).unwrap_or_default() * (self.speed_per_m * beyond),
+            turn: self.turn_per_rad * turned,
+        }
+    }
+}
+
 /// Joint angles within which leg and arm reach for a target.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -133,6 +168,8 @@ pub struct Limits {
     pub stance_torso: TorsoRange,
     /// Torso on three feet.
     pub gripper_torso: TorsoRange,
+    /// A robot that walks.
+    pub walking: WalkingLimits,
     /// Gripper.
     pub gripper: LimbRange,
     /// Foot in the air.
@@ -166,6 +203,19 @@ impl Default for Limits {
         Self {
             stance_torso: TorsoRange { z: Range { min: -0.12, max: 0.07 }, ..gripper_torso },
             gripper_torso,
+            walking: WalkingLimits {
+                torso: TorsoRange {
+                    x: Range::around_zero(0.0),
+                    y: Range::around_zero(0.0),
+                    z: Range { min: 0.15, max: 0.35 },
+                    yaw: Range::around_zero(0.0),
+                    ..gripper_torso
+                },
+                dead_zone_m: 0.04,
+                dead_zone_rad: 0.15,
+                speed_per_m: 3.0,
+                turn_per_rad: 2.0,
+            },
             gripper: LimbRange {
                 x: Range { min: -0.2, max: 0.22 },
                 outward: Range { min: -0.15, max: 0.22 },

@@ -24,7 +24,7 @@ pub use command::{Command, EngagementId, RequestId};
 pub use engagement::{Engagement, Grip};
 pub use follower::PoseFollower;
 pub use foot_reach::FootReach;
-pub use limits::{LimbRange, Limits, Range, RateLimits, ReachRange, TorsoRange};
+pub use limits::{LimbRange, Limits, Range, RateLimits, ReachRange, TorsoRange, WalkingLimits};
 pub use quintic::{PointMotion, PoseMotion, RotationMotion};
 pub use ramp::{Ramp, SampleClock};
 pub use reach::{LimbReference, Reach};

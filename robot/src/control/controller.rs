@@ -78,7 +78,12 @@ impl Controller {
         Self {
             estimator: KinematicEstimator::new(control.estimator),
             machine: Machine::default(),
-            choreography: Choreography::new(control.poses, control.motions, config.limits),
+            choreography: Choreography::new(
+                control.poses,
+                control.motions,
+                config.limits,
+                config.locomotion,
+            ),
             wbc: WholeBodyController::new(config.wbc),
             compensation: Compensation::new(control.compensation),
             output: WbcOutput::hold(posture),
@@ -311,9 +316,15 @@ impl Controller {
                     &mut self.output,
                 );
                 let WbcOutput { position, velocity, torque, .. } = self.output;
-                let (kp, kd) = JointGains::vectors(gains.balance_kp, gains.balance_kd);
+                let walks = phase.is_walking();
+                let walking = self.config.locomotion.gains;
+                let (kp, kd) = if walks {
+                    JointGains::vectors(walking.kp, walking.kd)
+                } else {
+                    JointGains::vectors(gains.balance_kp, gains.balance_kd)
+                };
                 let mut command = JointCommand { position, velocity, torque, kp, kd, opening };
-                self.compensation.set_learning(!matches!(phase, Phase::LowerFoot(_)));
+                self.compensation.set_learning(!matches!(phase, Phase::LowerFoot(_)) && !walks);
                 self.compensation.apply(
                     &self.config.model,
                     &(position - state.position),

@@ -8,6 +8,7 @@ use super::CompensationSettings;
 use crate::{
     commander::Limits,
     estimator::EstimatorSettings,
+    locomotion::LocomotionSettings,
     model::{Model, ModelError},
     modes::{JointGains, MotionSettings, PoseSettings},
     supervisor::Thresholds,
@@ -39,6 +40,8 @@ pub struct RobotConfig {
     pub wbc: WbcSettings,
     /// `control.toml`
     pub control: ControlSettings,
+    /// `locomotion.toml`
+    pub locomotion: LocomotionSettings,
     /// `limits.toml`
     pub limits: Limits,
     /// `supervisor.toml`
@@ -80,6 +83,7 @@ impl RobotConfig {
             model: Model::load(&folder)?,
             wbc: WbcSettings::load(&folder.join("wbc.toml"))?,
             control: read(&folder.join("control.toml"))?,
+            locomotion: read(&folder.join("locomotion.toml"))?,
             limits: read(&folder.join("limits.toml"))?,
             thresholds: read(&folder.join("supervisor.toml"))?,
         })
@@ -102,6 +106,7 @@ mod tests {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
         let config = RobotConfig::load(&configs).unwrap();
         assert_eq!(config.control, ControlSettings::default());
+        assert_eq!(config.locomotion, LocomotionSettings::default());
         assert_eq!(config.limits, Limits::default());
         assert_eq!(config.thresholds, Thresholds::default());
     }

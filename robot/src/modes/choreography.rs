@@ -18,6 +18,7 @@ use super::{
     touch_down::{Felt, TouchDown},
 };
 use crate::{
+    locomotion::LocomotionSettings,
     commander::{Limits, PointMotion, PoseMotion, PoseReference},
     estimator::heading,
     joints::{JointVector, Leg, Side},
@@ -80,7 +81,12 @@ pub struct Choreography {
 
 impl Choreography {
     /// At rest, damped.
-    pub fn new(poses: PoseSettings, motions: MotionSettings, limits: Limits) -> Self {
+    pub fn new(
+        poses: PoseSettings,
+        motions: MotionSettings,
+        limits: Limits,
+        walking: LocomotionSettings,
+    ) -> Self {
         let identity = Isometry3::identity();
         let stand = poses.posture(&poses.stand_rad);
         Self {
@@ -94,7 +100,7 @@ impl Choreography {
             touch_down: TouchDown::new(Descent::hold(Vector3::zeros())),
             landed: false,
             airborne_s: None,
-            driving: Driving::new(limits, &stand),
+            driving: Driving::new(limits, walking, &stand),
             phase: Phase::Damped,
             entered_ns: 0,
             poses,
@@ -177,6 +183,20 @@ impl Choreography {
             Phase::LiftFoot(effector) => self.begin_lift(effector, scene),
             Phase::SingleFoot(side) => self.driving.begin_foot(side, &mut self.setpoint, scene),
             Phase::SingleGripper(side) => self.driving.begin_gripper(side, &mut self.setpoint, scene),
+            Phase::Walk => {
+                self.hold_arms(scene);
+                self.driving.begin_walk(None, &self.setpoint, scene);
+            }
+            Phase::WalkHolding(arms) => self.driving.begin_walk(Some(arms), &self.setpoint, scene),
+            Phase::Unfold(arms) => {
+                self.move_torso(&self.setpoint.torso.pose());
+                for side in Side::ALL {
+                    let posture =
+                        if arms.contain(side) { self.poses.carry(side) } else { self.poses.stow(side) };
+                    self.move_arm(side, &posture, scene);
+                }
+            }
+            Phase::Halt => self.stow_arms(scene),
             Phase::Stow(side) => self.begin_stow(side, scene, &stand),
             Phase::LowerFoot(side) => self.begin_lowering(side, scene),
         }
@@ -236,6 +256,22 @@ impl Choreography {
             Phase::Stance => {
                 self.driving.step(operator, scene, &mut self.setpoint);
                 Progress::on_four_feet(true)
+            }
+            Phase::Walk | Phase::WalkHolding(_) => {
+                self.driving.step(operator, scene, &mut self.setpoint);
+                Progress::on_four_feet(true)
+            }
+            Phase::Unfold(_) => {
+                self.play(elapsed_s);
+                let arms_over = self.arms.iter().all(|motion| elapsed_s >= motion.duration_s());
+                Progress::on_four_feet(self.torso.is_over(elapsed_s) && arms_over)
+            }
+            Phase::Halt => {
+                self.driving.halt(scene, &mut self.setpoint);
+                for side in Side::ALL {
+                    self.setpoint.hold_arm(side, self.arms[side.index()].sample(elapsed_s));
+                }
+                Progress::on_four_feet(self.driving.is_halted())
             }
             Phase::ShiftTorso(effector) => {
                 self.play(elapsed_s);
@@ -313,6 +349,15 @@ impl Choreography {
         let MotionSettings { torso_s, torso_m_s, torso_rad_s, .. } = self.motions;
         let duration_s = torso_s.max(distance / torso_m_s).max(angle / torso_rad_s);
         self.torso = PoseMotion::new(start, goal, duration_s);
+    }
+
+    /// Arms whose posture is not in force stay as they are asked to be.
+    fn hold_arms(&mut self, scene: &Scene<'_>) {
+        for side in Side::ALL {
+            let posture = PointReference::hold(scene.desired_arm(side));
+            let posture = self.setpoint.arm(side).copied().unwrap_or(posture);
+            self.setpoint.hold_arm(side, posture);
+        }
     }
 
     fn stow_arms(&mut self, scene: &Scene<'_>) {

@@ -2,7 +2,11 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
-use super::{mode::Effector, scene::Scene, setpoint::Setpoint};
+use super::{
+    mode::{Arms, Effector},
+    scene::Scene,
+    setpoint::Setpoint,
+};
 use crate::{
     collision::Ground,
     commander::{
@@ -10,10 +14,11 @@ use crate::{
         TorsoReach, from_above, rebased_point,
     },
     joints::{JointVector, Side},
+    locomotion::{LocomotionSettings, Velocity, Walker},
     kinematics::torso_from_frame,
     model::{FOOT_RADIUS_M, Frame},
     trajectory::{Player, Sample},
-    wbc::RotationReference,
+    wbc::{PointReference, RotationReference},
 };
 
 /// Cut-off of the low-pass filter of the centre of mass, rad/s. [E] 3 Hz: a limb at 0.5 m/s moves it by 0.06 m/s,
@@ -48,13 +53,19 @@ pub struct Driving {
     foot_reach: FootReach,
     /// What moves torso and end effector in place of the operator's displacements.
     player: Option<Player>,
+    walking: LocomotionSettings,
+    /// What walks, and with which arms.
+    walker: Option<(Walker, Option<Arms>)>,
+    velocity: Velocity,
+    /// Grippers right, left that are turned while the robot walks.
+    held: [DrivenBody; 2],
     opening: [f64; 2],
     opening_goal: [f64; 2],
 }
 
 impl Driving {
     /// At rest.
-    pub fn new(limits: Limits, posture: &JointVector) -> Self {
+    pub fn new(limits: Limits, walking: LocomotionSettings, posture: &JointVector) -> Self {
         let still = PoseReference::hold(&Isometry3::identity());
         Self {
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
@@ -66,6 +77,10 @@ impl Driving {
             gripper_reach: Reach::new(Side::Right, posture, limits.reach),
             foot_reach: FootReach::new(Side::Right.leg(), posture, limits.reach),
             player: None,
+            walking,
+            walker: None,
+            velocity: Velocity::default(),
+            held: [DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate); 2],
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             limits,
@@ -81,6 +96,37 @@ impl Driving {
     pub fn begin_stance(&mut self, setpoint: &Setpoint, scene: &Scene<'_>) {
         self.effector = None;
         self.begin_torso(setpoint, self.limits.stance_torso_rate, scene);
+    }
+
+    /// Takes over a robot that stands, to walk.
+    pub fn begin_walk(&mut self, arms: Option<Arms>, setpoint: &Setpoint, scene: &Scene<'_>) {
+        self.effector = None;
+        let walker = Walker::new(self.walking, scene);
+        let posture = walker.posture_of(&setpoint.torso);
+        self.torso = DrivenBody::new(posture, self.limits.follower_rad_s, self.limits.stance_torso_rate);
+        self.walker = Some((walker, arms));
+        self.velocity = Velocity::default();
+        for side in Side::ALL {
+            let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
+            let gripper = turned((setpoint.torso.pose() * torso_from_gripper).rotation);
+            self.held[side.index()] = DrivenBody::new(
+                PoseReference::hold(&gripper),
+                self.limits.follower_rad_s,
+                self.limits.gripper_rate,
+            );
+        }
+    }
+
+    /// Whether a robot that walked stands on four feet again.
+    pub fn is_halted(&self) -> bool {
+        self.walker.as_ref().is_none_or(|(walker, _)| walker.is_halted())
+    }
+
+    /// One step of a robot that comes to a halt.
+    pub fn halt(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        self.velocity = Velocity::default();
+        self.release();
+        self.walk(None, scene, setpoint);
     }
 
     /// Takes over torso and foot, as its reference moves.
@@ -112,6 +158,7 @@ impl Driving {
     }
 
     fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits, scene: &Scene<'_>) {
+        self.walker = None;
         self.torso_reach = TorsoReach::new(&setpoint.torso.pose(), scene.desired);
         self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
         self.com_from_torso = None;
@@ -121,6 +168,9 @@ impl Driving {
     pub fn step(&mut self, operator: &Operator<'_>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         self.listen(operator, scene);
         let played = self.player.as_ref().map(Player::sample);
+        if self.walker.is_some() {
+            return self.walk(played.as_ref(), scene, setpoint);
+        }
         self.move_torso(played.as_ref(), scene, setpoint);
         match self.effector {
             None => {}
@@ -139,6 +189,10 @@ impl Driving {
 
     fn listen(&mut self, operator: &Operator<'_>, scene: &Scene<'_>) {
         let Some((command, grip)) = operator.command else { return self.release() };
+        self.velocity = match grip {
+            Grip::Begins | Grip::Holds => self.limits.walking.velocity(command),
+            Grip::Frozen | Grip::Released | Grip::Resumes => Velocity::default(),
+        };
         self.gripper_reach.pause(grip == Grip::Frozen);
         if let Some(player) = &mut self.player {
             player.advance(grip == Grip::Holds, scene.dt_s);
@@ -149,6 +203,7 @@ impl Driving {
             Grip::Begins => {
                 self.torso.engage();
                 self.limb.engage();
+                self.held.iter_mut().for_each(DrivenBody::engage);
                 self.player = command.trajectory.as_ref().map(Player::new);
             }
             Grip::Resumes => self.release(),
@@ -160,6 +215,14 @@ impl Driving {
             return;
         }
         self.torso.displace(command.torso.as_ref(), operator.clock, scene.now_ns);
+        if self.walker.is_some() {
+            for side in Side::ALL {
+                let turn = command.palms[side.index()].map(|palm| turned(palm.rotation));
+                self.held[side.index()].displace(turn.as_ref(), operator.clock, scene.now_ns);
+                let opening = command.opening[side.index()];
+                self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
+            }
+        }
         match self.effector {
             None => {}
             Some(Effector::Foot(side)) => {
@@ -177,6 +240,7 @@ impl Driving {
     fn release(&mut self) {
         self.torso.release();
         self.limb.release();
+        self.held.iter_mut().for_each(DrivenBody::release);
         self.gripper_reach.stay();
         self.player = None;
     }
@@ -207,6 +271,34 @@ impl Driving {
             None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
         }
         setpoint.torso = *self.torso.reference();
+    }
+
+    /// The torso along its course, at the height and tilt that are asked for; the feet under it; grippers as they are
+    /// turned.
+    fn walk(&mut self, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        let Some((walker, arms)) = &mut self.walker else { return };
+        let range = self.limits.walking.torso;
+        let permitted = |wanted: &Isometry3<f64>| range.clamp(wanted);
+        match played {
+            Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
+            None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
+        }
+        let steps = walker.step(&self.velocity, self.torso.reference(), scene);
+        setpoint.walk(&steps, *arms);
+        for side in Side::ALL {
+            let gripper = &mut self.held[side.index()];
+            match played {
+                Some(sample) => {
+                    let place = side.index();
+                    self.opening_goal[place] = sample.opening[place].unwrap_or(self.opening_goal[place]);
+                    let mut turn = sample.limbs[place];
+                    turn.point = PointReference::hold(Vector3::zeros());
+                    gripper.advance_along(&turn, scene.dt_s, |wanted| *wanted);
+                }
+                None => gripper.advance(scene.now_ns, scene.dt_s, |wanted| *wanted),
+            }
+            setpoint.turn_gripper(side, gripper.reference().rotation);
+        }
     }
 
     /// The foot, within its box, above the ground, within reach.
@@ -267,4 +359,9 @@ impl Driving {
             }
         }
     }
+}
+
+/// A rotation as the pose of a body that is only turned.
+fn turned(rotation: UnitQuaternion<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(Vector3::zeros().into(), rotation)
 }

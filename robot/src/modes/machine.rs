@@ -120,7 +120,7 @@ impl Machine {
         if inputs.tilted && !lowers {
             return Request::Refused(Refusal::Tilted);
         }
-        if inputs.control_fault && mode.effector().is_some() {
+        if inputs.control_fault && mode.is_of_motion() {
             return Request::Refused(Refusal::Control);
         }
         Request::Accepted(mode)
@@ -144,7 +144,7 @@ impl Machine {
         match severity {
             Severity::None | Severity::Warn | Severity::Hold | Severity::Disengage => {}
             Severity::Stand => {
-                if self.goal.effector().is_some() {
+                if self.goal.is_of_motion() {
                     self.goal = Mode::Stance;
                 }
             }
@@ -161,6 +161,10 @@ impl Machine {
     fn next(&mut self, inputs: &Inputs) -> Phase {
         let lowers = matches!(self.goal, Mode::Damped | Mode::LieDown);
         let wanted = self.goal.effector();
+        let walking = match self.goal {
+            Mode::LocoManipulation(arms) => Some(arms),
+            _ => None,
+        };
         let wanted_of = |side: Side| wanted.filter(|effector| effector.side() == side);
         match self.phase {
             Phase::Damped if lowers => {
@@ -175,7 +179,21 @@ impl Machine {
                 Phase::Stance
             }
             Phase::Stance if lowers => Phase::LieDown,
-            Phase::Stance => wanted.map_or(Phase::Stance, Phase::ShiftTorso),
+            Phase::Stance => self.leave_stance(),
+            Phase::Unfold(arms) if walking != Some(arms) => {
+                self.turn_back(Mode::LocoManipulation(arms), Phase::Recentre)
+            }
+            Phase::Unfold(arms) if inputs.arrived => {
+                self.mode = self.goal;
+                Phase::WalkHolding(arms)
+            }
+            Phase::Walk if self.goal != Mode::Locomotion => Phase::Halt,
+            Phase::WalkHolding(arms) if walking != Some(arms) => Phase::Halt,
+            Phase::Halt if self.goal == Mode::Locomotion => {
+                self.mode = self.goal;
+                Phase::Walk
+            }
+            Phase::Halt if inputs.arrived => Phase::Recentre,
             Phase::ShiftTorso(effector) if wanted != Some(effector) => {
                 self.turn_back(effector.mode(), Phase::Recentre)
             }
@@ -208,6 +226,19 @@ impl Machine {
                 Phase::Damped
             }
             phase => phase,
+        }
+    }
+
+    fn leave_stance(&mut self) -> Phase {
+        match self.goal {
+            Mode::Foot(side) => Phase::ShiftTorso(Effector::Foot(side)),
+            Mode::Gripper(side) => Phase::ShiftTorso(Effector::Gripper(side)),
+            Mode::Locomotion => {
+                self.mode = self.goal;
+                Phase::Walk
+            }
+            Mode::LocoManipulation(arms) => Phase::Unfold(arms),
+            Mode::Damped | Mode::Stance | Mode::LieDown => Phase::Stance,
         }
     }
 

@@ -30,6 +30,28 @@ impl Effector {
     }
 }
 
+/// Arms that work while the robot walks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Arms {
+    /// One of them.
+    One(Side),
+    /// Both.
+    Both,
+}
+
+impl Arms {
+    /// All choices.
+    pub const ALL: [Self; 3] = [Self::One(Side::Right), Self::One(Side::Left), Self::Both];
+
+    /// Whether this one works.
+    pub fn contain(self, side: Side) -> bool {
+        match self {
+            Self::One(one) => one == side,
+            Self::Both => true,
+        }
+    }
+}
+
 /// What an operator may ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Mode {
@@ -41,6 +63,10 @@ pub enum Mode {
     Foot(Side),
     /// Standing on three feet, torso and gripper follow.
     Gripper(Side),
+    /// Walking.
+    Locomotion,
+    /// Walking, while arms hold and turn their grippers.
+    LocoManipulation(Arms),
     /// Lying on the belly, then damped.
     LieDown,
 }
@@ -51,8 +77,13 @@ impl Mode {
         match self {
             Self::Foot(side) => Some(Effector::Foot(side)),
             Self::Gripper(side) => Some(Effector::Gripper(side)),
-            Self::Damped | Self::Stance | Self::LieDown => None,
+            Self::Damped | Self::Stance | Self::Locomotion | Self::LocoManipulation(_) | Self::LieDown => None,
         }
+    }
+
+    /// Whether the robot moves at all in it, beyond standing and lying.
+    pub const fn is_of_motion(self) -> bool {
+        !matches!(self, Self::Damped | Self::Stance | Self::LieDown)
     }
 
     /// From the wire; nothing for an unspecified mode.
@@ -66,6 +97,10 @@ impl Mode {
             messages::Mode::RightGripper => Some(Self::Gripper(Side::Right)),
             messages::Mode::LeftGripper => Some(Self::Gripper(Side::Left)),
             messages::Mode::LieDown => Some(Self::LieDown),
+            messages::Mode::Locomotion => Some(Self::Locomotion),
+            messages::Mode::RightLocoManipulation => Some(Self::LocoManipulation(Arms::One(Side::Right))),
+            messages::Mode::LeftLocoManipulation => Some(Self::LocoManipulation(Arms::One(Side::Left))),
+            messages::Mode::LocoManipulation => Some(Self::LocoManipulation(Arms::Both)),
         }
     }
 
@@ -78,6 +113,10 @@ impl Mode {
             Self::Foot(Side::Left) => messages::Mode::LeftFoot,
             Self::Gripper(Side::Right) => messages::Mode::RightGripper,
             Self::Gripper(Side::Left) => messages::Mode::LeftGripper,
+            Self::Locomotion => messages::Mode::Locomotion,
+            Self::LocoManipulation(Arms::One(Side::Right)) => messages::Mode::RightLocoManipulation,
+            Self::LocoManipulation(Arms::One(Side::Left)) => messages::Mode::LeftLocoManipulation,
+            Self::LocoManipulation(Arms::Both) => messages::Mode::LocoManipulation,
             Self::LieDown => messages::Mode::LieDown,
         }
     }
@@ -106,13 +145,21 @@ pub enum Phase {
     Stow(Side),
     /// The foot goes down until it carries load.
     LowerFoot(Side),
+    /// Walking, or standing ready to; the operator moves the robot.
+    Walk,
+    /// On four feet: arms unfold.
+    Unfold(Arms),
+    /// The same as `Walk`, and the operator turns grippers.
+    WalkHolding(Arms),
+    /// Slows down, steps until all feet are in their places, stands. Arms fold.
+    Halt,
     /// Joints go to the fold, then damp.
     LieDown,
 }
 
 impl Phase {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 29] = [
         Self::Damped,
         Self::StandUp,
         Self::Recentre,
@@ -133,6 +180,14 @@ impl Phase {
         Self::Stow(Side::Left),
         Self::LowerFoot(Side::Right),
         Self::LowerFoot(Side::Left),
+        Self::Walk,
+        Self::Unfold(Arms::One(Side::Right)),
+        Self::Unfold(Arms::One(Side::Left)),
+        Self::Unfold(Arms::Both),
+        Self::WalkHolding(Arms::One(Side::Right)),
+        Self::WalkHolding(Arms::One(Side::Left)),
+        Self::WalkHolding(Arms::Both),
+        Self::Halt,
         Self::LieDown,
     ];
 
@@ -149,6 +204,10 @@ impl Phase {
             Self::SingleGripper(_) => "single gripper",
             Self::Stow(_) => "stow",
             Self::LowerFoot(_) => "lower foot",
+            Self::Walk => "walk",
+            Self::Unfold(_) => "unfold arms",
+            Self::WalkHolding(_) => "walk and hold",
+            Self::Halt => "halt",
             Self::LieDown => "lie down",
         }
     }
@@ -173,6 +232,14 @@ impl Phase {
 
     /// The operator moves the robot.
     pub const fn is_driven(self) -> bool {
-        matches!(self, Self::Stance | Self::SingleFoot(_) | Self::SingleGripper(_))
+        matches!(
+            self,
+            Self::Stance | Self::SingleFoot(_) | Self::SingleGripper(_) | Self::Walk | Self::WalkHolding(_)
+        )
+    }
+
+    /// The robot walks, or may at any time.
+    pub const fn is_walking(self) -> bool {
+        matches!(self, Self::Walk | Self::WalkHolding(_) | Self::Halt)
     }
 }

@@ -2,11 +2,15 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::table::{self, MAX_OBJECTIVES, Row};
+use super::{
+    mode::Arms,
+    table::{self, MAX_OBJECTIVES, Row},
+};
 use crate::{
     commander::{PoseReference, rebased_point},
     joints::{Leg, Side},
-    wbc::{ContactSet, Objective, ObjectiveKind, PointReference},
+    locomotion::Steps,
+    wbc::{ContactSet, Objective, ObjectiveKind, PointReference, RotationReference},
 };
 
 /// References of all bodies, which of them are in force, and the feet that stand.
@@ -75,6 +79,19 @@ impl Setpoint {
         self.grippers[side.index()] = gripper;
     }
 
+    /// The robot walks; grippers of these arms are turned.
+    pub fn walk(&mut self, steps: &Steps, arms: Option<Arms>) {
+        self.row = arms.map_or(&table::LOCOMOTION, table::loco_manipulation);
+        self.torso = steps.torso;
+        self.feet = steps.feet;
+        self.contacts = steps.contacts;
+    }
+
+    /// How a gripper is turned, for when only that is in force.
+    pub fn turn_gripper(&mut self, side: Side, rotation: RotationReference) {
+        self.grippers[side.index()].rotation = rotation;
+    }
+
     /// The joints of an arm, for when its posture is in force.
     pub fn hold_arm(&mut self, side: Side, posture: PointReference) {
         self.arms[side.index()] = posture;
@@ -111,13 +128,19 @@ impl Setpoint {
         }
     }
 
+    /// A foot that stands is not moved.
+    fn is_in_force(&self, kind: ObjectiveKind) -> bool {
+        !matches!(kind, ObjectiveKind::FootPosition(leg) if self.contacts.contains(leg))
+    }
+
     /// The row's objectives with their references.
     pub fn objectives(&self) -> ObjectiveList {
         let mut list = ObjectiveList {
             objectives: [Objective::TorsoPosition(self.torso.point); MAX_OBJECTIVES],
             count: 0,
         };
-        for (place, kind) in list.objectives.iter_mut().zip(self.row.objectives) {
+        let kinds = self.row.objectives.iter().filter(|kind| self.is_in_force(**kind));
+        for (place, kind) in list.objectives.iter_mut().zip(kinds) {
             *place = self.objective(*kind);
             list.count += 1;
         }

@@ -18,6 +18,8 @@ pub struct PoseSettings {
     pub left_stow_rad: Vector3<f64>,
     /// The left arm ready for use, rad; the right one has joint 2 mirrored.
     pub left_ready_rad: Vector3<f64>,
+    /// The left arm as it is carried while walking, rad; the right one has joint 2 mirrored.
+    pub left_carry_rad: Vector3<f64>,
     /// Torso's origin above the feet's centres in stance, m.
     pub stand_height_m: f64,
     /// How far the torso rises before a foot lifts, m.
@@ -39,6 +41,7 @@ impl Default for PoseSettings {
             fold_rad: Vector3::new(0.0, 1.39, -2.78),
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
+            left_carry_rad: Vector3::new(-2.24, 0.0, 0.0),
             stand_height_m: 0.265,
             rise_m: 0.04,
             shift_margin_m: 0.07,
@@ -58,6 +61,11 @@ impl PoseSettings {
     /// The posture of an arm ready for use.
     pub fn ready(&self, side: Side) -> Vector3<f64> {
         mirrored(&self.left_ready_rad, side)
+    }
+
+    /// The posture of an arm that is carried while walking.
+    pub fn carry(&self, side: Side) -> Vector3<f64> {
+        mirrored(&self.left_carry_rad, side)
     }
 
     /// The posture of the lifted leg's arm in which a mode begins.

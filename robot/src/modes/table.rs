@@ -4,7 +4,7 @@
 //! The paper's table ends with the gripper's orientation. What it leaves free, the joints of stowed arms, is
 //! held by posture objectives after all of it, where they disturb nothing.
 
-use super::mode::Mode;
+use super::mode::{Arms, Mode};
 use crate::{
     joints::{Leg, Side},
     wbc::{
@@ -101,12 +101,93 @@ pub static SINGLE_GRIPPER: [Row; 2] = [
     },
 ];
 
+/// Locomotion. Which feet stand changes all the time; those that do not are tracked.
+pub static LOCOMOTION: Row = Row {
+    mode: Mode::Locomotion,
+    objectives: &[
+        TorsoPosition,
+        TorsoOrientation,
+        FootPosition(Leg::FrontRight),
+        FootPosition(Leg::FrontLeft),
+        FootPosition(Leg::RearRight),
+        FootPosition(Leg::RearLeft),
+        ArmPosture(Side::Right),
+        ArmPosture(Side::Left),
+    ],
+    stance: &Leg::ALL,
+};
+
+/// Loco-manipulation with the right arm, the left arm, both.
+pub static LOCO_MANIPULATION: [Row; 3] = [
+    Row {
+        mode: Mode::LocoManipulation(Arms::One(Side::Right)),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            FootPosition(Leg::FrontRight),
+            FootPosition(Leg::FrontLeft),
+            FootPosition(Leg::RearRight),
+            FootPosition(Leg::RearLeft),
+            GripperOrientation(Side::Right),
+            ArmPosture(Side::Left),
+        ],
+        stance: &Leg::ALL,
+    },
+    Row {
+        mode: Mode::LocoManipulation(Arms::One(Side::Left)),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            FootPosition(Leg::FrontRight),
+            FootPosition(Leg::FrontLeft),
+            FootPosition(Leg::RearRight),
+            FootPosition(Leg::RearLeft),
+            GripperOrientation(Side::Left),
+            ArmPosture(Side::Right),
+        ],
+        stance: &Leg::ALL,
+    },
+    Row {
+        mode: Mode::LocoManipulation(Arms::Both),
+        objectives: &[
+            TorsoPosition,
+            TorsoOrientation,
+            FootPosition(Leg::FrontRight),
+            FootPosition(Leg::FrontLeft),
+            FootPosition(Leg::RearRight),
+            FootPosition(Leg::RearLeft),
+            GripperOrientation(Side::Right),
+            GripperOrientation(Side::Left),
+        ],
+        stance: &Leg::ALL,
+    },
+];
+
+/// The row of loco-manipulation with these arms.
+pub fn loco_manipulation(arms: Arms) -> &'static Row {
+    let [right, left, both] = &LOCO_MANIPULATION;
+    match arms {
+        Arms::One(Side::Right) => right,
+        Arms::One(Side::Left) => left,
+        Arms::Both => both,
+    }
+}
+
 /// All rows.
-pub static TABLE: [&Row; 5] =
-    [&STANCE, &SINGLE_FOOT[0], &SINGLE_FOOT[1], &SINGLE_GRIPPER[0], &SINGLE_GRIPPER[1]];
+pub static TABLE: [&Row; 9] = [
+    &STANCE,
+    &SINGLE_FOOT[0],
+    &SINGLE_FOOT[1],
+    &SINGLE_GRIPPER[0],
+    &SINGLE_GRIPPER[1],
+    &LOCOMOTION,
+    &LOCO_MANIPULATION[0],
+    &LOCO_MANIPULATION[1],
+    &LOCO_MANIPULATION[2],
+];
 
 /// The most objectives in a row.
-pub const MAX_OBJECTIVES: usize = 6;
+pub const MAX_OBJECTIVES: usize = 8;
 
 #[cfg(test)]
 mod tests {

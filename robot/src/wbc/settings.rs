@@ -168,7 +168,7 @@ impl Default for WbcSettings {
             objectives: ObjectiveGains {
                 torso_position: gains(100.0, 10.0, 0.05, 10.0, 0.05),
                 torso_orientation: gains(100.0, 10.0, 0.3, 10.0, 0.05),
-                foot_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
+                foot_position: gains(100.0, 10.0, 0.05, 100.0, 0.02),
                 gripper_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_orientation: gains(100.0, 10.0, 0.3, 30.0, 0.05),
                 arm_posture: gains(100.0, 10.0, 0.3, 30.0, 0.05),

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::ensure;
 use locoman_robot::commander::Command;
 use locoman_robot::control::{Controller, Inputs, Options as ControlOptions, RobotConfig, Snapshot};
+use locoman_robot::locomotion::Velocity;
 use locoman_robot::modes::Mode;
 use locoman_robot::plant::{JointCommand, Plant, Sensors};
 use locoman_robot::trajectory::Trajectory;
@@ -29,6 +30,8 @@ pub struct Lockstep {
     truth: Truth,
     ticks: u64,
     silent: bool,
+    /// How often the operator has engaged.
+    engagements: u64,
 }
 
 impl Lockstep {
@@ -43,7 +46,7 @@ impl Lockstep {
         let controller = Controller::new(config, ControlOptions { auto_stand: true });
         let operator = Command::idle(1);
         let (command, truth) = (*controller.command(), plant.truth());
-        Ok(Self { plant, controller, command, sensors: None, operator, truth, ticks: 0, silent: false })
+        Ok(Self { plant, controller, command, sensors: None, operator, truth, ticks: 0, silent: false, engagements: 0 })
     }
 
     /// One control step.
@@ -96,7 +99,8 @@ impl Lockstep {
 
     /// Engages with a trajectory. Returns with the robot at its beginning, time 0.
     pub fn engage(&mut self, trajectory: &Trajectory) -> anyhow::Result<()> {
-        self.operator.engagement += 1;
+        self.engagements += 1;
+        self.operator.engagement = self.engagements;
         self.operator.trajectory = Some(*trajectory);
         self.tick()?;
         let engaged = self.snapshot().engagement;
@@ -106,6 +110,17 @@ impl Lockstep {
             self.snapshot().assessment
         );
         Ok(())
+    }
+
+    /// Engages, to walk at a velocity; none lets go.
+    pub fn walk(&mut self, velocity: Option<Velocity>) {
+        self.operator.walk = velocity;
+        if velocity.is_none() {
+            self.operator.engagement = 0;
+        } else if self.operator.engagement == 0 {
+            self.engagements += 1;
+            self.operator.engagement = self.engagements;
+        }
     }
 
     /// The operator's commands come, or no longer do.

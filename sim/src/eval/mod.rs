@@ -13,6 +13,7 @@ pub mod robustness;
 pub mod statistics;
 pub mod tracking;
 pub mod vision;
+pub mod walking;
 pub mod workspace;
 
 use std::path::{Path, PathBuf};
@@ -52,6 +53,8 @@ pub enum Experiment {
     Tracking(tracking::Args),
     /// Unreachable and singular targets, pushes, loads, slippery feet, lost commands: does it fall or shake?
     Robustness(robustness::Args),
+    /// Walking: pace, pushes, rough ground.
+    Walking(walking::Args),
     /// How much more the arms reach than the feet: the paper's table, in several definitions.
     Workspace,
 }
@@ -65,6 +68,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::Walking(of) => walking::run(configs, of, args.seed)?,
         Experiment::Workspace => workspace::run(configs, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,
     };

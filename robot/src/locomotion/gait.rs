@@ -1,0 +1,140 @@
+//! When which foot stands: a clock that all legs share, and for each leg where it is in its cycle.
+//!
+//! ```text
+//! phase of a leg   0 ────────── duty ───────── 1
+//!                    stance          swing
+//! ```
+//! The clock plans; the feet decide. A foot that feels the ground early stands from then on, one that misses it keeps
+//! searching, and no foot lifts that the others could not do without.
+
+use super::settings::{ContactEvents, GaitSettings};
+use crate::{
+    joints::Leg,
+    wbc::ContactSet,
+};
+
+/// Where a leg is in its cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LegPhase {
+    /// On the ground for so long, s.
+    Stance {
+        /// Since it landed.
+        for_s: f64,
+    },
+    /// In the air.
+    Swing {
+        /// Share of the planned swing that is over; above 1 the foot is late.
+        progress: f64,
+    },
+}
+
+/// The clock and the legs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gait {
+    pattern: GaitSettings,
+    events: ContactEvents,
+    /// 0 to 1.
+    phase: f64,
+    /// All feet stand, the clock is stopped.
+    halted: bool,
+    legs: [LegPhase; 4],
+    /// In the stance that the clock plans, each leg lifts once at most.
+    due: [bool; 4],
+}
+
+impl Gait {
+    /// Halted, on four feet.
+    pub fn halted(pattern: GaitSettings, events: ContactEvents) -> Self {
+        let standing = LegPhase::Stance { for_s: f64::INFINITY };
+        Self { pattern, events, phase: 0.0, halted: true, legs: [standing; 4], due: [false; 4] }
+    }
+
+    /// Whether it stands on four feet without stepping.
+    pub const fn is_halted(&self) -> bool {
+        self.halted
+    }
+
+    /// Where a leg is in its cycle.
+    pub const fn leg(&self, leg: Leg) -> LegPhase {
+        self.legs[leg.index()]
+    }
+
+    /// Duration of a planned swing, s.
+    pub fn swing_s(&self) -> f64 {
+        (1.0 - self.pattern.duty) / self.pattern.frequency_hz
+    }
+
+    /// Duration of a planned stance, s.
+    pub fn stance_s(&self) -> f64 {
+        self.pattern.duty / self.pattern.frequency_hz
+    }
+
+    /// One step of the clock, with the vertical forces of the feet, N. It halts, if it `may`, when all feet stand.
+    pub fn step(&mut self, dt_s: f64, may_halt: bool, foot_force: &[f64; 4]) {
+        let all_stand = self.legs.iter().all(|leg| matches!(leg, LegPhase::Stance { .. }));
+        if may_halt && all_stand {
+            self.halted = true;
+        } else if self.halted && !may_halt {
+            // Every leg's stance has just begun or is not over.
+            (self.halted, self.phase) = (false, 0.0);
+        }
+        if !self.halted {
+            self.phase = (self.phase + dt_s * self.pattern.frequency_hz).fract();
+        }
+        for leg in Leg::ALL {
+            self.step_leg(leg, dt_s, foot_force[leg.index()]);
+        }
+    }
+
+    fn step_leg(&mut self, leg: Leg, dt_s: f64, force_n: f64) {
+        let planned_stance = self.halted || self.local(leg) < self.pattern.duty;
+        let touches = force_n > self.events.touch_n;
+        let may_lift = self.may_lift(leg);
+        let place = leg.index();
+        if planned_stance {
+            self.due[place] = true;
+        }
+        self.legs[place] = match self.legs[place] {
+            LegPhase::Stance { for_s } if !planned_stance && self.due[place] && may_lift => {
+                self.due[place] = false;
+                // A stance that was cut short by nothing: the swing begins where the clock has it.
+                let _ = for_s;
+                LegPhase::Swing { progress: 0.0 }
+            }
+            LegPhase::Stance { for_s } => LegPhase::Stance { for_s: for_s + dt_s },
+            LegPhase::Swing { progress } if touches && progress > self.events.earliest_touch => {
+                LegPhase::Stance { for_s: 0.0 }
+            }
+            LegPhase::Swing { progress } => LegPhase::Swing { progress: progress + dt_s / self.swing_s() },
+        };
+    }
+
+    /// A foot may lift while two others stand.
+    fn may_lift(&self, leg: Leg) -> bool {
+        let stands = |other: &&Leg| **other != leg && matches!(self.leg(**other), LegPhase::Stance { .. });
+        Leg::ALL.iter().filter(stands).count() >= 2
+    }
+
+    /// The leg's own phase, 0 to 1.
+    fn local(&self, leg: Leg) -> f64 {
+        (self.phase + self.pattern.offset[leg.index()]).fract()
+    }
+
+    /// The feet that stand, with the share of the load that each may take: a foot is loaded after it lands and unloaded
+    /// before it lifts.
+    pub fn contacts(&self) -> ContactSet {
+        let mut contacts = ContactSet::of(&[]);
+        for leg in Leg::ALL {
+            if let LegPhase::Stance { for_s } = self.leg(leg) {
+                let left_s = if self.halted {
+                    f64::INFINITY
+                } else {
+                    (self.pattern.duty - self.local(leg)) / self.pattern.frequency_hz
+                };
+                let share = (for_s.min(left_s.max(0.0)) / self.events.load_s).clamp(self.events.least_share, 1.0);
+                contacts = contacts.with_share(leg, share);
+            }
+        }
+        contacts
+    }
+}

@@ -1,0 +1,25 @@
+//! Walking: where the torso goes, when which foot lifts, and where it lands.
+//!
+//! ```text
+//! velocity ──► Course ──► torso's reference ─────────────────────────────┐
+//!                │                                                       ├──► Setpoint ──► whole-body controller
+//! Gait ──► which feet stand ──► landing, Swing ──► feet's references ────┘
+//!   ▲ feet that feel the ground
+//! ```
+
+mod course;
+mod gait;
+mod placement;
+mod settings;
+mod swing;
+mod walker;
+
+pub use course::{Course, Velocity};
+pub use gait::{Gait, LegPhase};
+pub use placement::{GroundPlane, Motion, landing};
+pub use settings::{
+    ContactEvents, CourseSettings, GaitSettings, LocomotionSettings, PlacementSettings, SwingSettings,
+    WalkingGains,
+};
+pub use swing::Swing;
+pub use walker::{Steps, Walker};

@@ -1,0 +1,85 @@
+//! Where a foot should land.
+//!
+//! ```text
+//! p = hip when it lands + ½ T_stance v + k (v - v̄)
+//! ```
+//! (Raibert, "Legged robots that balance", 1986.) The hip is the foot's place about the robot's centre of mass, not
+//! about its torso: with two feet on the ground the robot tips about the line between them, and should as much one way
+//! as the other. v is the velocity of that place, v̄ what it should be.
+
+use nalgebra::{Rotation2, Vector2, Vector3};
+
+use super::settings::PlacementSettings;
+use crate::joints::Leg;
+
+/// How the robot moves, seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Of the middle of the robot, m.
+    pub position: Vector2<f64>,
+    /// Where it faces, rad.
+    pub heading: f64,
+    /// m/s.
+    pub velocity: Vector2<f64>,
+    /// What that should be, m/s.
+    pub wanted: Vector2<f64>,
+    /// rad/s.
+    pub turn: f64,
+}
+
+/// Where a foot should land in `after_s`, to stand for `stance_s`.
+pub fn landing(leg: Leg, motion: &Motion, after_s: f64, stance_s: f64, settings: &PlacementSettings) -> Vector2<f64> {
+    let place = Rotation2::new(motion.heading + motion.turn * after_s) * place_of(leg, settings);
+    let swept = motion.turn * Vector2::new(-place.y, place.x);
+    let ahead = 0.5 * stance_s * (motion.velocity + swept)
+        + settings.velocity_gain_s * (motion.velocity - motion.wanted);
+    let back = Rotation2::new(-motion.heading);
+    let ahead = back * ahead;
+    let reach = settings.reach_m;
+    let ahead = Vector2::new(ahead.x.clamp(-reach.x, reach.x), ahead.y.clamp(-reach.y, reach.y));
+    motion.position + motion.velocity * after_s + place + Rotation2::new(motion.heading) * ahead
+}
+
+/// Where a foot stands about the middle of the robot.
+fn place_of(leg: Leg, settings: &PlacementSettings) -> Vector2<f64> {
+    let stance = settings.stance_m;
+    match leg {
+        Leg::FrontRight => Vector2::new(stance.x, -stance.y),
+        Leg::FrontLeft => stance,
+        Leg::RearRight => -stance,
+        Leg::RearLeft => Vector2::new(-stance.x, stance.y),
+    }
+}
+
+/// Height of the ground at a place, by the plane that fits the feet's last places on the ground best.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundPlane {
+    /// Last places of the feet's centres on the ground.
+    footholds: [Vector3<f64>; 4],
+}
+
+impl GroundPlane {
+    /// Through four feet.
+    pub const fn new(footholds: [Vector3<f64>; 4]) -> Self {
+        Self { footholds }
+    }
+
+    /// A foot stands somewhere.
+    pub fn stand(&mut self, leg: Leg, foot: Vector3<f64>) {
+        self.footholds[leg.index()] = foot;
+    }
+
+    /// Height of a foot's centre on the ground there.
+    pub fn height(&self, at: &Vector2<f64>) -> f64 {
+        let mean = self.footholds.iter().sum::<Vector3<f64>>() / 4.0;
+        let (mut moments, mut lean) = (nalgebra::Matrix2::from_diagonal_element(1e-3), Vector2::zeros());
+        for foothold in &self.footholds {
+            let from_mean = foothold - mean;
+            let seen = from_mean.xy();
+            moments += seen * seen.transpose();
+            lean += seen * from_mean.z;
+        }
+        let slope = moments.cholesky().map_or_else(Vector2::zeros, |factor| factor.solve(&lean));
+        mean.z + slope.dot(&(at - mean.xy()))
+    }
+}
