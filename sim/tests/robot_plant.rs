@@ -14,7 +14,7 @@ fn configs() -> PathBuf {
 }
 
 fn plant(profile: &str, posture: &str, seed: u64) -> LockstepPlant {
-    let options = Options { profile: profile.into(), posture: posture.into(), seed };
+    let options = Options { profile: profile.into(), posture: posture.into(), seed, ..Options::default() };
     LockstepPlant::new(&configs(), &options).unwrap()
 }
 

@@ -48,7 +48,7 @@ fn robot(switched_on: &[&str], seed: u64) -> SimRobot {
     }
     let scene: Scene = scene.try_into().unwrap();
     let model = Model::load(&configs().join("robot")).unwrap();
-    let options = Options { profile: "ideal".into(), posture: "standing".into(), seed };
+    let options = Options { profile: "ideal".into(), posture: "standing".into(), seed, ..Options::default() };
     SimRobot::with_model(&model, scene, &options).unwrap()
 }
 

@@ -35,6 +35,8 @@ pub struct Gait {
     events: ContactEvents,
     /// 0 to 1.
     phase: f64,
+    /// Cycles a second, now.
+    frequency_hz: f64,
     /// All feet stand, the clock is stopped.
     halted: bool,
     legs: [LegPhase; 4],
@@ -46,7 +48,15 @@ impl Gait {
     /// Halted, on four feet.
     pub fn halted(pattern: GaitSettings, events: ContactEvents) -> Self {
         let standing = LegPhase::Stance { for_s: f64::INFINITY };
-        Self { pattern, events, phase: 0.0, halted: true, legs: [standing; 4], due: [false; 4] }
+        Self {
+            pattern,
+            events,
+            phase: 0.0,
+            frequency_hz: pattern.frequency_hz,
+            halted: true,
+            legs: [standing; 4],
+            due: [false; 4],
+        }
     }
 
     /// Whether it stands on four feet without stepping.
@@ -61,12 +71,18 @@ impl Gait {
 
     /// Duration of a planned swing, s.
     pub fn swing_s(&self) -> f64 {
-        (1.0 - self.pattern.duty) / self.pattern.frequency_hz
+        (1.0 - self.pattern.duty) / self.frequency_hz
     }
 
     /// Duration of a planned stance, s.
     pub fn stance_s(&self) -> f64 {
-        self.pattern.duty / self.pattern.frequency_hz
+        self.pattern.duty / self.frequency_hz
+    }
+
+    /// Steps faster when the robot is off its course by a velocity, m/s: feet that stand longer would be left behind.
+    pub fn hurry(&mut self, off_course_m_s: f64) {
+        let GaitSettings { frequency_hz, hurry_hz_s_m, fastest_hz, .. } = self.pattern;
+        self.frequency_hz = (frequency_hz + hurry_hz_s_m * off_course_m_s.max(0.0)).min(fastest_hz);
     }
 
     /// One step of the clock, with the vertical forces of the feet, N. It halts, if it `may`, when all feet stand.
@@ -79,7 +95,7 @@ impl Gait {
             (self.halted, self.phase) = (false, 0.0);
         }
         if !self.halted {
-            self.phase = (self.phase + dt_s * self.pattern.frequency_hz).fract();
+            self.phase = (self.phase + dt_s * self.frequency_hz).fract();
         }
         for leg in Leg::ALL {
             self.step_leg(leg, dt_s, foot_force[leg.index()]);
@@ -129,7 +145,7 @@ impl Gait {
                 let left_s = if self.halted {
                     f64::INFINITY
                 } else {
-                    (self.pattern.duty - self.local(leg)) / self.pattern.frequency_hz
+                    (self.pattern.duty - self.local(leg)) / self.frequency_hz
                 };
                 let share = (for_s.min(left_s.max(0.0)) / self.events.load_s).clamp(self.events.least_share, 1.0);
                 contacts = contacts.with_share(leg, share);

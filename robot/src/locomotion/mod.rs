@@ -19,7 +19,7 @@ pub use gait::{Gait, LegPhase};
 pub use placement::{GroundPlane, Motion, landing};
 pub use settings::{
     ContactEvents, CourseSettings, GaitSettings, LocomotionSettings, PlacementSettings, SwingSettings,
-    WalkingGains,
+    TrimSettings, WalkingGains,
 };
 pub use swing::Swing;
 pub use walker::{Steps, Walker};

@@ -36,7 +36,9 @@ pub fn landing(leg: Leg, motion: &Motion, after_s: f64, stance_s: f64, settings:
     let back = Rotation2::new(-motion.heading);
     let ahead = back * ahead;
     let reach = settings.reach_m;
-    let ahead = Vector2::new(ahead.x.clamp(-reach.x, reach.x), ahead.y.clamp(-reach.y, reach.y));
+    let outward = place_of(leg, settings).y.signum();
+    let aside = (outward * ahead.y).clamp(-settings.inward_m, reach.y);
+    let ahead = Vector2::new(ahead.x.clamp(-reach.x, reach.x), outward * aside);
     motion.position + motion.velocity * after_s + place + Rotation2::new(motion.heading) * ahead
 }
 

@@ -17,6 +17,8 @@ pub struct LocomotionSettings {
     pub swing: SwingSettings,
     /// How the torso goes along.
     pub course: CourseSettings,
+    /// What is learned of the torso's lean.
+    pub trim: TrimSettings,
     /// Legs, N m/rad and N m s/rad.
     pub gains: WalkingGains,
 }
@@ -31,6 +33,10 @@ pub struct GaitSettings {
     pub duty: f64,
     /// By how much of a cycle each leg is ahead: FR, FL, RR, RL.
     pub offset: [f64; 4],
+    /// Cycles a second that a robot which was thrown off its course makes more for each m/s of it.
+    pub hurry_hz_s_m: f64,
+    /// Most cycles a second.
+    pub fastest_hz: f64,
 }
 
 /// When feet land and are loaded.
@@ -55,8 +61,10 @@ pub struct PlacementSettings {
     pub stance_m: Vector2<f64>,
     /// By how far a foot lands ahead for each m/s that the torso is faster than it should be, s.
     pub velocity_gain_s: f64,
-    /// Greatest distance from the foot's place, forward and sideways, m.
+    /// Greatest distance from the foot's place, forward and outward, m.
     pub reach_m: Vector2<f64>,
+    /// The same inward, m: feet do not cross.
+    pub inward_m: f64,
 }
 
 /// How feet swing.
@@ -93,6 +101,18 @@ pub struct CourseSettings {
     pub balance_m: f64,
 }
 
+/// What is learned of the torso's lean.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrimSettings {
+    /// How fast, 1/s.
+    pub rate: f64,
+    /// Greatest offset of the height, m.
+    pub most_m: f64,
+    /// Greatest offset of the tilt, rad.
+    pub most_rad: f64,
+}
+
 /// Joint gains of walking legs.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -106,12 +126,13 @@ pub struct WalkingGains {
 impl Default for LocomotionSettings {
     fn default() -> Self {
         Self {
-            gait: GaitSettings { frequency_hz: 2.0, duty: 0.55, offset: [0.0, 0.5, 0.5, 0.0] },
+            gait: GaitSettings { frequency_hz: 2.0, duty: 0.55, offset: [0.0, 0.5, 0.5, 0.0], hurry_hz_s_m: 1.5, fastest_hz: 4.0 },
             contact: ContactEvents { touch_n: 10.0, earliest_touch: 0.6, load_s: 0.02, least_share: 0.05 },
             placement: PlacementSettings {
                 stance_m: Vector2::new(0.188, 0.127),
                 velocity_gain_s: 0.03,
-                reach_m: Vector2::new(0.2, 0.12),
+                reach_m: Vector2::new(0.25, 0.25),
+                inward_m: 0.08,
             },
             swing: SwingSettings { height_m: 0.06, landing_m_s: 0.1, search_m: 0.06 },
             course: CourseSettings {
@@ -124,6 +145,7 @@ impl Default for LocomotionSettings {
                 ground_s: 0.1,
                 balance_m: 0.05,
             },
+            trim: TrimSettings { rate: 2.0, most_m: 0.03, most_rad: 0.15 },
             gains: WalkingGains { kp: 30.0, kd: 1.0 },
         }
     }

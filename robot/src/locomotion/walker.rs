@@ -1,12 +1,12 @@
 //! One step of walking, from the robot as it is to what torso and feet should do.
 
-use nalgebra::{Isometry3, Rotation2, Vector2, Vector3};
+use nalgebra::{Isometry3, Rotation2, UnitQuaternion, Vector2, Vector3};
 
 use super::{
     course::{Course, Velocity},
     gait::{Gait, LegPhase},
     placement::{GroundPlane, Motion, landing},
-    settings::LocomotionSettings,
+    settings::{LocomotionSettings, TrimSettings},
     swing::Swing,
 };
 use crate::{
@@ -23,6 +23,8 @@ const RESTING_M_S: f64 = 0.01;
 const RESTING_RAD_S: f64 = 0.02;
 /// The robot steps on for so long after it came to rest, in cycles: its feet come to their places.
 const STEPS_AFTER: f64 = 1.2;
+/// The velocity of a robot that walks undisturbed is off its course by so much within a step, m/s.
+const STRIDE_M_S: f64 = 0.15;
 /// Time constant with which the middle of the robot is found, s: longer than a step.
 const MIDDLE_S: f64 = 0.5;
 
@@ -49,6 +51,9 @@ pub struct Walker {
     ground_m: f64,
     /// From the torso's origin to the centre of mass, seen from above, in the robot's heading.
     middle: Vector2<f64>,
+    /// What the torso's height, roll and pitch are asked to be beyond what they should be, for they come out too small
+    /// by it: m, and a rotation vector in the world.
+    trim: (f64, Vector3<f64>),
     /// How long the robot has been at rest, s.
     resting_s: f64,
 }
@@ -65,6 +70,7 @@ impl Walker {
             swings: feet.map(|foot| Swing::new(foot, gait.swing_s())),
             ground_m: ground.height(&from_above(&torso.translation.vector)),
             middle: middle(scene),
+            trim: (0.0, Vector3::zeros()),
             resting_s: f64::INFINITY,
             settings,
             gait,
@@ -101,12 +107,30 @@ impl Walker {
         self.middle += (middle(scene) - self.middle) * (scene.dt_s / MIDDLE_S).min(1.0);
         let before = self.gait;
         let may_halt = self.may_halt(wanted, scene);
-        self.gait.step(scene.dt_s, may_halt, &scene.foot_force);
         let motion = self.motion(scene);
+        self.gait.hurry((motion.velocity - motion.wanted).norm() - STRIDE_M_S);
+        self.gait.step(scene.dt_s, may_halt, &scene.foot_force);
         let feet = Leg::ALL.map(|leg| self.move_foot(leg, &before, &motion, scene));
         let ground_m = self.ground.height(&here);
         self.ground_m += (ground_m - self.ground_m) * (scene.dt_s / self.settings.course.ground_s).min(1.0);
-        Steps { torso: self.torso(posture), feet, contacts: self.gait.contacts() }
+        let reference = self.torso(posture);
+        Steps { torso: self.trimmed(reference, scene), feet, contacts: self.gait.contacts() }
+    }
+
+    /// A robot whose masses are not those of the model leans until feedback makes up for it. What a step disturbs comes
+    /// back within the step; what stays is learned, as an offset of the reference.
+    fn trimmed(&mut self, mut torso: PoseReference, scene: &Scene<'_>) -> PoseReference {
+        let real = &scene.state.world_from_torso;
+        let low = torso.point.position.z - real.translation.z;
+        let lean = (torso.rotation.orientation * real.rotation.inverse()).scaled_axis();
+        let TrimSettings { rate, most_m, most_rad } = self.settings.trim;
+        let (height, tilt) = &mut self.trim;
+        let share = rate * scene.dt_s;
+        *height = (*height + share * low).clamp(-most_m, most_m);
+        *tilt = (*tilt + share * Vector3::new(lean.x, lean.y, 0.0)).cap_magnitude(most_rad);
+        torso.point.position.z += *height;
+        torso.rotation.orientation = UnitQuaternion::from_scaled_axis(*tilt) * torso.rotation.orientation;
+        torso
     }
 
     /// Nobody asks for motion, the robot is at rest and balanced, and its feet are in their places.

@@ -134,6 +134,11 @@ impl Lockstep {
         self.operator.engagement = 0;
     }
 
+    /// What the operator's commands say, besides who sent them and when.
+    pub fn operator_mut(&mut self) -> &mut Command {
+        &mut self.operator
+    }
+
     /// What the controller says.
     pub fn snapshot(&self) -> &Snapshot {
         self.controller.snapshot()

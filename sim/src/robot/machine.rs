@@ -20,6 +20,7 @@ use super::drives::Drives;
 use super::noise::SensorNoise;
 use super::profile::Profile;
 use super::scene::{Posture, Scene};
+use super::terrain::Terrain;
 use super::world::{MOTORS, Truth, World};
 use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, body, go1_wire, mjcf};
 
@@ -35,11 +36,13 @@ pub struct Options {
     pub posture: String,
     /// Seed of everything random.
     pub seed: u64,
+    /// What it stands on.
+    pub terrain: Terrain,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { profile: "hw".into(), posture: "lying".into(), seed: 1 }
+        Self { profile: "hw".into(), posture: "lying".into(), seed: 1, terrain: Terrain::Flat }
     }
 }
 
@@ -80,7 +83,7 @@ impl SimRobot {
     pub fn with_model(model: &Model, scene: Scene, options: &Options) -> Result<Self, SimRobotError> {
         let profile = *scene.profile(&options.profile)?;
         let robot = body::built(model, &profile.body, options.seed);
-        let world = World::new(&mjcf::write(&robot, &scene, &profile)?, &profile.feet)?;
+        let world = World::new(&mjcf::write(&robot, &scene, &profile, &options.terrain.blocks(options.seed))?, &profile.feet)?;
         let steps = |seconds: f64| (seconds / scene.physics.timestep_s).round() as u64;
         let mut robot = Self {
             world,

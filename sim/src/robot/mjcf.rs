@@ -14,6 +14,7 @@ use super::jaws::{JAW_RADIUS_M, Jaw, without};
 use super::profile::Profile;
 use super::scene::Scene;
 use super::shapes::{Part, Shape, shapes};
+use super::terrain::Block;
 
 /// The jaw that each gripper's servo turns; its partner (`…_partner`) is geared to it.
 pub const JAW_NAMES: [&str; 2] = ["right_jaw", "left_jaw"];
@@ -29,7 +30,7 @@ pub const ROTOR: &str = "_rotor";
 const ARMS_FROM: usize = 12;
 /// The trunk's body.
 pub const TRUNK: &str = "trunk";
-/// The ground's geom.
+/// The ground's geom; those of what lies on it have numbers after it.
 pub const GROUND: &str = "ground";
 
 /// Contact bits: who may touch whom. The ground touches everything; an arm touches the trunk and the other
@@ -51,7 +52,12 @@ const JOINT_FRICTION: &str = r#"solreffriction="0.001 1" solimpfriction="0.9999 
 const FOOT_CONTACT: &str = r#" priority="1""#;
 
 /// The scene as MJCF text.
-pub fn write(model: &Model, scene: &Scene, profile: &Profile) -> Result<String, SimRobotError> {
+pub fn write(
+    model: &Model,
+    scene: &Scene,
+    profile: &Profile,
+    blocks: &[Block],
+) -> Result<String, SimRobotError> {
     let turned = model.joints.iter().position(|joint| joint.parent_from_joint.rotation.angle() != 0.0);
     if let Some(joint) = turned {
         return Err(SimRobotError::MuJoCo(format!(
@@ -59,7 +65,7 @@ pub fn write(model: &Model, scene: &Scene, profile: &Profile) -> Result<String, 
             JOINT_NAMES[joint]
         )));
     }
-    let mut writer = Writer { model, scene, profile, text: String::new() };
+    let mut writer = Writer { model, scene, profile, blocks, text: String::new() };
     writer.document();
     Ok(writer.text)
 }
@@ -68,6 +74,7 @@ struct Writer<'a> {
     model: &'a Model,
     scene: &'a Scene,
     profile: &'a Profile,
+    blocks: &'a [Block],
     text: String,
 }
 
@@ -94,6 +101,16 @@ impl Writer<'_> {
             contact_attributes(GROUND_BITS),
         );
         self.line(head);
+        for (number, block) in self.blocks.iter().enumerate() {
+            let turn = block.rotation;
+            self.line(format!(
+                r#"<geom name="{GROUND}_{number}" type="box" pos="{}" size="{}" quat="{}" {}/>"#,
+                numbers(block.center.as_slice()),
+                numbers(block.half.as_slice()),
+                numbers(&[turn.w, turn.i, turn.j, turn.k]),
+                contact_attributes(GROUND_BITS),
+            ));
+        }
         self.trunk();
         self.line("</worldbody>");
         self.play();

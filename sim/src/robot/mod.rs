@@ -27,6 +27,7 @@ pub mod scene;
 pub mod server;
 pub mod servo;
 pub mod shapes;
+pub mod terrain;
 pub mod world;
 
 pub use command::{Args, run};
@@ -34,6 +35,7 @@ pub use disturbance::{Disturbance, Target};
 pub use error::SimRobotError;
 pub use lockstep::LockstepPlant;
 pub use machine::{Options, SimRobot};
+pub use terrain::Terrain;
 pub use world::Truth;
 
 /// One exchange: the control period of the robot.

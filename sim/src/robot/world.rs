@@ -38,7 +38,7 @@ pub struct World {
     /// Which foot a geom is, if it is one.
     foot_of_geom: Vec<Option<u8>>,
     is_trunk_geom: Vec<bool>,
-    ground: i32,
+    is_ground_geom: Vec<bool>,
     pub(super) trunk: usize,
     pub(super) grasps: [usize; 2],
 }
@@ -116,7 +116,10 @@ impl World {
         let trunk = body(TRUNK)?;
         let grasps = [body(GRASP_NAMES[0])?, body(GRASP_NAMES[1])?];
         let is_trunk_geom = model.geom_bodyid().iter().map(|&body| address(body) == trunk).collect();
-        let ground = i32::try_from(id(&model, MjtObjBase::mjOBJ_GEOM, GROUND)?).unwrap_or_default();
+        let is_ground = |geom: usize| {
+            model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).is_some_and(|name| name.starts_with(GROUND))
+        };
+        let is_ground_geom = (0..model.geom_bodyid().len()).map(is_ground).collect();
         if feet.stiffness_n_m > 0.0 {
             rubber::soften(&mut model, &foot_geoms, feet);
         }
@@ -135,7 +138,7 @@ impl World {
             gripper_sites,
             foot_of_geom,
             is_trunk_geom,
-            ground,
+            is_ground_geom,
             trunk,
             grasps,
         })
@@ -236,13 +239,17 @@ impl World {
         let is_foot = |geom: i32| self.foot_of_geom.get(address(geom)).copied().flatten().is_some();
         self.data.contact().iter().filter(|contact| contact.dist < 0.0).filter_map(move |contact| {
             let [a, b] = contact.geom;
-            match (a == self.ground, b == self.ground) {
+            match (self.is_ground(a), self.is_ground(b)) {
                 (false, false) => Some(Unplanned::OfItself([a, b].map(|geom| self.geom_name(geom)))),
                 (true, _) if !is_foot(b) => Some(Unplanned::WithGround(self.geom_name(b))),
                 (_, true) if !is_foot(a) => Some(Unplanned::WithGround(self.geom_name(a))),
                 _ => None,
             }
         })
+    }
+
+    fn is_ground(&self, geom: i32) -> bool {
+        self.is_ground_geom.get(address(geom)).copied().unwrap_or(false)
     }
 
     fn geom_name(&self, geom: i32) -> String {
@@ -256,7 +263,7 @@ impl World {
         let touches = self.data.contact().iter().any(|contact| {
             let is_trunk = |geom: i32| self.is_trunk_geom.get(address(geom)).copied().unwrap_or(false);
             let [a, b] = contact.geom;
-            (a == self.ground && is_trunk(b)) || (b == self.ground && is_trunk(a))
+            (self.is_ground(a) && is_trunk(b)) || (self.is_ground(b) && is_trunk(a))
         });
         touches || (self.attitude() * Vector3::z()).z < COS_60_DEG
     }

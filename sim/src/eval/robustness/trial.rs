@@ -90,7 +90,7 @@ pub fn run(configs: &Path, profile: &str, case: Case, seed: u64) -> anyhow::Resu
     let side = if seed % 2 == 1 { Side::Right } else { Side::Left };
     let config = RobotConfig::load(configs)?;
     let model = config.model.clone();
-    let options = Options { profile: profile.into(), posture: "standing".into(), seed };
+    let options = Options { profile: profile.into(), posture: "standing".into(), seed, ..Options::default() };
     let mut sut = Lockstep::with_config(configs, config, &options)?;
     sut.go_to(Mode::Gripper(side))?;
     sut.run(0.5)?;

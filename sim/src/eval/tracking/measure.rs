@@ -63,7 +63,7 @@ pub fn measure(
     trajectory: &Trajectory,
 ) -> anyhow::Result<Run> {
     let side = task.side(seed);
-    let options = Options { profile: profile.into(), posture: "standing".into(), seed };
+    let options = Options { profile: profile.into(), posture: "standing".into(), seed, ..Options::default() };
     let mut sut = Lockstep::new(configs, &options)?;
     sut.go_to(task.mode(side))?;
     sut.run(REST_S - ALIGN_S)?;
