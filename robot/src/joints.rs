@@ -37,6 +37,16 @@ impl Leg {
         3 * self as usize
     }
 
+    /// The leg on the other side.
+    pub const fn across(self) -> Self {
+        match self {
+            Self::FrontRight => Self::FrontLeft,
+            Self::FrontLeft => Self::FrontRight,
+            Self::RearRight => Self::RearLeft,
+            Self::RearLeft => Self::RearRight,
+        }
+    }
+
     /// The side of a front leg: that of the arm which it carries.
     pub const fn side(self) -> Option<Side> {
         match self {

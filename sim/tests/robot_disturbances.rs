@@ -12,7 +12,8 @@ const GRAVITY: f64 = 9.81;
 
 fn standing() -> LockstepPlant {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let options = Options { profile: "ideal".into(), posture: "standing".into(), seed: 1, ..Options::default() };
+    let options =
+        Options { profile: "ideal".into(), posture: "standing".into(), seed: 1, ..Options::default() };
     LockstepPlant::new(&configs, &options).unwrap()
 }
 

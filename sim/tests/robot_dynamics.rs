@@ -31,7 +31,8 @@ struct Oracle {
 
 impl Oracle {
     fn new(configs: &Path) -> Self {
-        let options = Options { profile: "ideal".into(), posture: "standing".into(), seed: 1, ..Options::default() };
+        let options =
+            Options { profile: "ideal".into(), posture: "standing".into(), seed: 1, ..Options::default() };
         let mut plant = LockstepPlant::new(configs, &options).unwrap();
         let model = plant.robot_mut().world_mut().data_mut().model_clone();
         let mut at = [0; DOF];

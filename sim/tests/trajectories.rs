@@ -22,7 +22,8 @@ fn trajectory() -> Trajectory {
 
 fn ready() -> Lockstep {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let options = Options { posture: "standing".into(), profile: "ideal".into(), seed: 1, ..Options::default() };
+    let options =
+        Options { posture: "standing".into(), profile: "ideal".into(), seed: 1, ..Options::default() };
     let mut sut = Lockstep::new(&configs, &options).unwrap();
     sut.go_to(Mode::Gripper(Side::Right)).unwrap();
     sut.run(0.5).unwrap();

@@ -78,12 +78,7 @@ impl Controller {
         Self {
             estimator: KinematicEstimator::new(control.estimator),
             machine: Machine::default(),
-            choreography: Choreography::new(
-                control.poses,
-                control.motions,
-                config.limits,
-                config.locomotion,
-            ),
+            choreography: Choreography::new(control.poses, control.motions, config.limits, config.locomotion),
             wbc: WholeBodyController::new(config.wbc),
             compensation: Compensation::new(control.compensation),
             output: WbcOutput::hold(posture),
@@ -306,6 +301,7 @@ impl Controller {
                 JointCommand { position, velocity, torque: self.output.torque * fading, kp, kd, opening }
             }
             _ => {
+                self.wbc.set_walking(phase.is_walking());
                 let setpoint = self.choreography.setpoint();
                 let objectives = setpoint.objectives();
                 self.wbc.step(

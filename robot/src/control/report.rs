@@ -27,7 +27,11 @@ impl Controller {
             let pose = torso * torso_from_frame(&self.config.model, &sensors.position, frame);
             let target = match setpoint.gripper(side) {
                 Some(reference) if balanced => reference.pose(),
-                _ if balanced => torso_target * torso_from_frame(&self.config.model, &self.desired, frame),
+                _ if balanced => {
+                    let held = torso_target * torso_from_frame(&self.config.model, &self.desired, frame);
+                    let turned = setpoint.gripper_rotation(side).map(|rotation| rotation.orientation);
+                    Isometry3::from_parts(held.translation, turned.unwrap_or(held.rotation))
+                }
                 _ => pose,
             };
             BodyState { pose, target }

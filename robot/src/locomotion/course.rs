@@ -65,10 +65,8 @@ impl Course {
         self.velocity.linear += change;
         let most = settings.turn_acceleration_rad_s2 * dt_s;
         self.velocity.turn += (wanted.turn - before.turn).clamp(-most, most);
-        self.acceleration = Velocity {
-            linear: change / dt_s,
-            turn: (self.velocity.turn - before.turn) / dt_s,
-        };
+        self.acceleration =
+            Velocity { linear: change / dt_s, turn: (self.velocity.turn - before.turn) / dt_s };
         self.heading += self.velocity.turn * dt_s;
         self.position += self.in_world(&self.velocity.linear) * dt_s;
         self.position = position + (self.position - position).cap_magnitude(settings.leash_m);

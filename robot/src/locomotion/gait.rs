@@ -8,10 +8,7 @@
 //! searching, and no foot lifts that the others could not do without.
 
 use super::settings::{ContactEvents, GaitSettings};
-use crate::{
-    joints::Leg,
-    wbc::ContactSet,
-};
+use crate::{joints::Leg, wbc::ContactSet};
 
 /// Where a leg is in its cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,7 +144,8 @@ impl Gait {
                 } else {
                     (self.pattern.duty - self.local(leg)) / self.frequency_hz
                 };
-                let share = (for_s.min(left_s.max(0.0)) / self.events.load_s).clamp(self.events.least_share, 1.0);
+                let share =
+                    (for_s.min(left_s.max(0.0)) / self.events.load_s).clamp(self.events.least_share, 1.0);
                 contacts = contacts.with_share(leg, share);
             }
         }

@@ -1,11 +1,12 @@
 //! Where a foot should land.
 //!
 //! ```text
-//! p = hip when it lands + ½ T_stance v + k (v - v̄)
+//! p = hip when it lands + ½ T_stance v̄ + k (v - v̄)
 //! ```
-//! (Raibert, "Legged robots that balance", 1986.) The hip is the foot's place about the robot's centre of mass, not
-//! about its torso: with two feet on the ground the robot tips about the line between them, and should as much one way
-//! as the other. v is the velocity of that place, v̄ what it should be.
+//! (Raibert, "Legged robots that balance", 1986.) v is the velocity of the hip, v̄ what it should be. The middle term is
+//! where a steady pace needs the foot; the last one brings a robot that was thrown off it back: with k = √(h / g), in one
+//! step. The hip is the foot's place about the robot's centre of mass, not about its torso: with two feet on the ground the
+//! robot tips about the line between them, and should as much one way as the other.
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
@@ -27,19 +28,27 @@ pub struct Motion {
     pub turn: f64,
 }
 
-/// Where a foot should land in `after_s`, to stand for `stance_s`.
-pub fn landing(leg: Leg, motion: &Motion, after_s: f64, stance_s: f64, settings: &PlacementSettings) -> Vector2<f64> {
+/// Where a foot should land in `after_s`, to stand for `stance_s`; on its own side of the `neighbour` across.
+pub fn landing(
+    leg: Leg,
+    motion: &Motion,
+    [after_s, stance_s]: [f64; 2],
+    neighbour: &Vector2<f64>,
+    settings: &PlacementSettings,
+) -> Vector2<f64> {
+    let heading = Rotation2::new(motion.heading);
     let place = Rotation2::new(motion.heading + motion.turn * after_s) * place_of(leg, settings);
     let swept = motion.turn * Vector2::new(-place.y, place.x);
-    let ahead = 0.5 * stance_s * (motion.velocity + swept)
-        + settings.velocity_gain_s * (motion.velocity - motion.wanted);
-    let back = Rotation2::new(-motion.heading);
-    let ahead = back * ahead;
+    let astray = motion.velocity - motion.wanted;
+    let ahead =
+        heading.inverse() * (0.5 * stance_s * (motion.wanted + swept) + settings.velocity_gain_s * astray);
     let reach = settings.reach_m;
+    let ahead = Vector2::new(ahead.x.clamp(-reach.x, reach.x), ahead.y.clamp(-reach.y, reach.y));
+    let middle = motion.position + motion.velocity * after_s;
+    let mut spot = heading.inverse() * (place - *neighbour + middle) + ahead;
     let outward = place_of(leg, settings).y.signum();
-    let aside = (outward * ahead.y).clamp(-settings.inward_m, reach.y);
-    let ahead = Vector2::new(ahead.x.clamp(-reach.x, reach.x), outward * aside);
-    motion.position + motion.velocity * after_s + place + Rotation2::new(motion.heading) * ahead
+    spot.y = outward * (outward * spot.y).max(settings.apart_m);
+    neighbour + heading * spot
 }
 
 /// Where a foot stands about the middle of the robot.

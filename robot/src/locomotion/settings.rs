@@ -61,10 +61,10 @@ pub struct PlacementSettings {
     pub stance_m: Vector2<f64>,
     /// By how far a foot lands ahead for each m/s that the torso is faster than it should be, s.
     pub velocity_gain_s: f64,
-    /// Greatest distance from the foot's place, forward and outward, m.
+    /// Greatest distance from the foot's place, forward and sideways, m.
     pub reach_m: Vector2<f64>,
-    /// The same inward, m: feet do not cross.
-    pub inward_m: f64,
+    /// Least distance aside of the neighbour's foot, m.
+    pub apart_m: f64,
 }
 
 /// How feet swing.
@@ -73,11 +73,25 @@ pub struct PlacementSettings {
 pub struct SwingSettings {
     /// Clearance in the middle of the swing, m.
     pub height_m: f64,
+    /// Under a torso at this height; lower ones have less, m.
+    pub torso_m: f64,
     /// Speed at which a foot meets the ground, m/s.
     pub landing_m_s: f64,
     /// A foot that misses the ground searches so deep, m.
     pub search_m: f64,
 }
+
+impl SwingSettings {
+    /// The same under a torso at another height: legs that are folded already cannot lift as high.
+    #[must_use]
+    pub fn under(&self, torso_m: f64) -> Self {
+        let share = (torso_m / self.torso_m).clamp(LEAST_SWING, 1.0);
+        Self { height_m: self.height_m * share, ..*self }
+    }
+}
+
+/// Least share of the clearance that a swing has.
+const LEAST_SWING: f64 = 0.3;
 
 /// How the torso goes along.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -126,15 +140,21 @@ pub struct WalkingGains {
 impl Default for LocomotionSettings {
     fn default() -> Self {
         Self {
-            gait: GaitSettings { frequency_hz: 2.0, duty: 0.55, offset: [0.0, 0.5, 0.5, 0.0], hurry_hz_s_m: 1.5, fastest_hz: 4.0 },
+            gait: GaitSettings {
+                frequency_hz: 2.0,
+                duty: 0.55,
+                offset: [0.0, 0.5, 0.5, 0.0],
+                hurry_hz_s_m: 3.0,
+                fastest_hz: 3.0,
+            },
             contact: ContactEvents { touch_n: 10.0, earliest_touch: 0.6, load_s: 0.02, least_share: 0.05 },
             placement: PlacementSettings {
-                stance_m: Vector2::new(0.188, 0.127),
-                velocity_gain_s: 0.03,
-                reach_m: Vector2::new(0.25, 0.25),
-                inward_m: 0.08,
+                stance_m: Vector2::new(0.188, 0.18),
+                velocity_gain_s: 0.2,
+                reach_m: Vector2::new(0.35, 0.35),
+                apart_m: 0.1,
             },
-            swing: SwingSettings { height_m: 0.06, landing_m_s: 0.1, search_m: 0.06 },
+            swing: SwingSettings { height_m: 0.06, torso_m: 0.285, landing_m_s: 0.1, search_m: 0.06 },
             course: CourseSettings {
                 speed_m_s: Vector2::new(0.8, 0.4),
                 turn_rad_s: 1.2,
@@ -146,7 +166,7 @@ impl Default for LocomotionSettings {
                 balance_m: 0.05,
             },
             trim: TrimSettings { rate: 2.0, most_m: 0.03, most_rad: 0.15 },
-            gains: WalkingGains { kp: 30.0, kd: 1.0 },
+            gains: WalkingGains { kp: 60.0, kd: 2.0 },
         }
     }
 }

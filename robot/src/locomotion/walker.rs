@@ -85,7 +85,8 @@ impl Walker {
 
     /// The ground under the torso, facing along the course.
     fn frame(&self) -> Isometry3<f64> {
-        let origin = Vector3::new(self.course.position.x, self.course.position.y, self.ground_m - FOOT_RADIUS_M);
+        let origin =
+            Vector3::new(self.course.position.x, self.course.position.y, self.ground_m - FOOT_RADIUS_M);
         Isometry3::from_parts(origin.into(), self.course.rotation())
     }
 
@@ -136,9 +137,8 @@ impl Walker {
     /// Nobody asks for motion, the robot is at rest and balanced, and its feet are in their places.
     fn may_halt(&mut self, wanted: &Velocity, scene: &Scene<'_>) -> bool {
         let limited = wanted.limited(&self.settings.course);
-        let going = |velocity: &Velocity| {
-            velocity.linear.norm() > RESTING_M_S || velocity.turn.abs() > RESTING_RAD_S
-        };
+        let going =
+            |velocity: &Velocity| velocity.linear.norm() > RESTING_M_S || velocity.turn.abs() > RESTING_RAD_S;
         let settings = &self.settings.course;
         let off_balance = self.off_balance(scene) > settings.balance_m;
         if going(&limited) || going(&self.course.velocity) || off_balance {
@@ -185,11 +185,14 @@ impl Walker {
             self.swings[place] = Swing::new(scene.foot(leg), self.gait.swing_s());
         }
         let left_s = (1.0 - progress).max(0.0) * self.gait.swing_s();
-        let spot = landing(leg, motion, left_s, self.gait.stance_s(), &self.settings.placement);
+        let neighbour = from_above(&scene.foot(leg.across()));
+        let times_s = [left_s, self.gait.stance_s()];
+        let spot = landing(leg, motion, times_s, &neighbour, &self.settings.placement);
         if progress < 1.0 {
             self.swings[place].aim(Vector3::new(spot.x, spot.y, self.ground.height(&spot)));
         }
-        self.swings[place].sample(progress, &self.settings.swing)
+        let height_m = scene.state.world_from_torso.translation.z - self.ground_m + FOOT_RADIUS_M;
+        self.swings[place].sample(progress, &self.settings.swing.under(height_m))
     }
 
     fn torso(&self, posture: &PoseReference) -> PoseReference {

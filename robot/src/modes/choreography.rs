@@ -18,11 +18,11 @@ use super::{
     touch_down::{Felt, TouchDown},
 };
 use crate::{
-    locomotion::LocomotionSettings,
     commander::{Limits, PointMotion, PoseMotion, PoseReference},
     estimator::heading,
     joints::{JointVector, Leg, Side},
     kinematics::{leg_towards, of_leg, torso_from_frame},
+    locomotion::LocomotionSettings,
     model::Frame,
     wbc::PointReference,
 };

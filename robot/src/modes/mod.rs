@@ -29,7 +29,7 @@ mod touch_down;
 pub use choreography::{Choreography, Progress};
 pub use driving::{Driving, Operator};
 pub use machine::{Inputs, Machine, Refusal, Request, Start};
-pub use mode::{Effector, Mode, Phase};
+pub use mode::{Arms, Effector, Mode, Phase};
 pub use scene::Scene;
 pub use setpoint::{ObjectiveList, Setpoint};
 pub use settings::{JointGains, MotionSettings, PoseSettings};

@@ -77,7 +77,9 @@ impl Mode {
         match self {
             Self::Foot(side) => Some(Effector::Foot(side)),
             Self::Gripper(side) => Some(Effector::Gripper(side)),
-            Self::Damped | Self::Stance | Self::Locomotion | Self::LocoManipulation(_) | Self::LieDown => None,
+            Self::Damped | Self::Stance | Self::Locomotion | Self::LocoManipulation(_) | Self::LieDown => {
+                None
+            }
         }
     }
 

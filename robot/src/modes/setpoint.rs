@@ -102,6 +102,12 @@ impl Setpoint {
         self.row.controls(ObjectiveKind::GripperPosition(side)).then_some(&self.grippers[side.index()])
     }
 
+    /// Reference of a gripper's orientation that is tracked.
+    pub fn gripper_rotation(&self, side: Side) -> Option<&RotationReference> {
+        let kind = ObjectiveKind::GripperOrientation(side);
+        self.row.controls(kind).then_some(&self.grippers[side.index()].rotation)
+    }
+
     /// Reference of a foot that is tracked.
     pub fn foot(&self, leg: Leg) -> Option<&PointReference> {
         self.row.controls(ObjectiveKind::FootPosition(leg)).then_some(&self.feet[leg.index()])

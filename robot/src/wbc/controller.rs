@@ -41,7 +41,9 @@ pub struct Tracked {
 
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
+    /// Those in force: of a robot that stands, or walks.
     settings: WbcSettings,
+    standing: WbcSettings,
     dynamics: Dynamics,
     tracking: Tracking,
     stops: Stops,
@@ -57,6 +59,7 @@ impl WholeBodyController {
     pub fn new(settings: WbcSettings) -> Self {
         Self {
             settings,
+            standing: settings,
             dynamics: Dynamics::new(),
             tracking: Tracking::new(),
             stops: Stops::new(),
@@ -74,6 +77,12 @@ impl WholeBodyController {
     /// The settings in use.
     pub fn settings(&self) -> &WbcSettings {
         &self.settings
+    }
+
+    /// The robot walks from now on, or stands.
+    pub fn set_walking(&mut self, walks: bool) {
+        self.settings = if walks { self.standing.for_walking() } else { self.standing };
+        self.forces.set_slack_weight(self.settings.contact.slack_weight);
     }
 
     /// Kinematics and dynamics at the state of the last step.

@@ -21,6 +21,14 @@ pub struct Gains {
     pub max_acceleration: f64,
     /// Singular values of the projected Jacobian below this are damped, m/rad or 1.
     pub damping_start: f64,
+    /// Share of the error that the joints' positions take up at once; the rest is left to accelerations. Below 1 for a
+    /// torso that two feet cannot move as they like.
+    #[serde(default = "whole")]
+    pub step_share: f64,
+}
+
+const fn whole() -> f64 {
+    1.0
 }
 
 /// Gains of every kind of objective.
@@ -73,6 +81,18 @@ pub struct ContactForceSettings {
     pub failures_to_fault: u32,
 }
 
+/// What is different while the robot walks.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WalkingSettings {
+    /// Torso position.
+    pub torso_position: Gains,
+    /// Torso orientation.
+    pub torso_orientation: Gains,
+    /// Q_2
+    pub slack_weight: [f64; 6],
+}
+
 /// How joints, limbs and links come to a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -116,6 +136,8 @@ pub struct WbcSettings {
     pub objectives: ObjectiveGains,
     /// Contact forces.
     pub contact: ContactForceSettings,
+    /// What is different while the robot walks.
+    pub walking: WalkingSettings,
     /// How everything comes to a stop.
     pub stops: StopSettings,
     /// Joints stop this far before the ends of their ranges, rad.
@@ -163,7 +185,9 @@ impl Default for WbcSettings {
             max_error,
             max_acceleration,
             damping_start,
+            step_share: 1.0,
         };
+        let axes = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
         Self {
             objectives: ObjectiveGains {
                 torso_position: gains(100.0, 10.0, 0.05, 10.0, 0.05),
@@ -180,6 +204,20 @@ impl Default for WbcSettings {
                 force_weight: 1e-5,
                 slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
                 failures_to_fault: 3,
+            },
+            walking: WalkingSettings {
+                torso_position: Gains {
+                    kd: axes(20.0, 20.0, 10.0),
+                    step_share: 0.5,
+                    ..gains(100.0, 0.0, 0.05, 20.0, 0.05)
+                },
+                torso_orientation: Gains {
+                    step_share: 0.5,
+                    kp: axes(200.0, 200.0, 100.0),
+                    kd: axes(20.0, 20.0, 10.0),
+                    ..gains(0.0, 0.0, 0.3, 50.0, 0.05)
+                },
+                slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
             },
             stops: StopSettings::default(),
             joint_margin: 0.01,
@@ -201,6 +239,17 @@ impl WbcSettings {
         }
     }
 
+    /// The same for a robot that walks.
+    #[must_use]
+    pub fn for_walking(&self) -> Self {
+        let WalkingSettings { torso_position, torso_orientation, slack_weight } = self.walking;
+        Self {
+            objectives: ObjectiveGains { torso_position, torso_orientation, ..self.objectives },
+            contact: ContactForceSettings { slack_weight, ..self.contact },
+            ..*self
+        }
+    }
+
     /// The first key whose number makes no sense, and what it must be.
     fn flaw(&self) -> Option<(&'static str, &'static str)> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
@@ -212,6 +261,8 @@ impl WbcSettings {
             ("objectives.gripper_position", &objectives.gripper_position),
             ("objectives.gripper_orientation", &objectives.gripper_orientation),
             ("objectives.arm_posture", &objectives.arm_posture),
+            ("walking.torso_position", &self.walking.torso_position),
+            ("walking.torso_orientation", &self.walking.torso_orientation),
         ];
         for (table, gains) in tables {
             if !gains.kp.iter().chain(&gains.kd).all(|gain| *gain >= 0.0 && gain.is_finite()) {

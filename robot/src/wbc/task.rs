@@ -71,7 +71,7 @@ impl Task {
         let error = error.cap_magnitude(gains.max_error);
         let feedback = gains.kp.component_mul(&error) + gains.kd.component_mul(&(desired - velocity));
         let command = (feed_forward + feedback).cap_magnitude(gains.max_acceleration);
-        Self { rows, error, velocity: desired, acceleration: command - bias }
+        Self { rows, error: error * gains.step_share, velocity: desired, acceleration: command - bias }
     }
 }
 

@@ -46,7 +46,17 @@ impl Lockstep {
         let controller = Controller::new(config, ControlOptions { auto_stand: true });
         let operator = Command::idle(1);
         let (command, truth) = (*controller.command(), plant.truth());
-        Ok(Self { plant, controller, command, sensors: None, operator, truth, ticks: 0, silent: false, engagements: 0 })
+        Ok(Self {
+            plant,
+            controller,
+            command,
+            sensors: None,
+            operator,
+            truth,
+            ticks: 0,
+            silent: false,
+            engagements: 0,
+        })
     }
 
     /// One control step.
@@ -75,11 +85,16 @@ impl Lockstep {
         // A robot that is standing up refuses: ask when it stands.
         self.wait("a stance", |state| state.mode != Mode::Damped && state.goal == state.mode)?;
         if self.snapshot().mode != mode {
-            self.operator.mode_request += 1;
-            self.operator.mode = Some(mode);
+            self.request(mode);
             self.wait(&format!("{mode:?}"), |state| state.mode == mode && state.goal == mode)?;
         }
         Ok(())
+    }
+
+    /// Asks for a mode.
+    pub fn request(&mut self, mode: Mode) {
+        self.operator.mode_request += 1;
+        self.operator.mode = Some(mode);
     }
 
     fn wait(&mut self, what: &str, there: impl Fn(&Snapshot) -> bool) -> anyhow::Result<()> {

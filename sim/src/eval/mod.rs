@@ -7,6 +7,8 @@ pub mod demo;
 pub mod drive;
 pub mod latency;
 pub mod lockstep;
+pub mod loco_manipulation;
+pub mod modes;
 pub mod punctuality;
 pub mod report;
 pub mod robustness;
@@ -53,6 +55,10 @@ pub enum Experiment {
     Tracking(tracking::Args),
     /// Unreachable and singular targets, pushes, loads, slippery feet, lost commands: does it fall or shake?
     Robustness(robustness::Args),
+    /// A gripper that points somewhere while the robot trots.
+    LocoManipulation(loco_manipulation::Args),
+    /// From every mode to every other.
+    Modes(modes::Args),
     /// Walking: pace, pushes, rough ground.
     Walking(walking::Args),
     /// How much more the arms reach than the feet: the paper's table, in several definitions.
@@ -68,6 +74,8 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::LocoManipulation(of) => loco_manipulation::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::Modes(of) => modes::run(configs, of, args.seed)?,
         Experiment::Walking(of) => walking::run(configs, of, args.seed)?,
         Experiment::Workspace => workspace::run(configs, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,

@@ -38,7 +38,12 @@ pub struct Args {
 
 /// Runs `locoman-sim robot` until Ctrl-C.
 pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
-    let options = Options { profile: args.profile.clone(), posture: args.posture.clone(), seed: args.seed, ..Options::default() };
+    let options = Options {
+        profile: args.profile.clone(),
+        posture: args.posture.clone(),
+        seed: args.seed,
+        ..Options::default()
+    };
     let mut robot = SimRobot::new(configs, &options)?;
     let socket = UdpSocket::bind(args.bind).with_context(|| {
         format!(

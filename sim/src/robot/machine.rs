@@ -83,7 +83,10 @@ impl SimRobot {
     pub fn with_model(model: &Model, scene: Scene, options: &Options) -> Result<Self, SimRobotError> {
         let profile = *scene.profile(&options.profile)?;
         let robot = body::built(model, &profile.body, options.seed);
-        let world = World::new(&mjcf::write(&robot, &scene, &profile, &options.terrain.blocks(options.seed))?, &profile.feet)?;
+        let world = World::new(
+            &mjcf::write(&robot, &scene, &profile, &options.terrain.blocks(options.seed))?,
+            &profile.feet,
+        )?;
         let steps = |seconds: f64| (seconds / scene.physics.timestep_s).round() as u64;
         let mut robot = Self {
             world,

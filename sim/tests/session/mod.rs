@@ -37,7 +37,12 @@ pub fn configs() -> PathBuf {
 
 impl Session {
     pub fn new(posture: &str, profile: &str, seed: u64) -> Self {
-        let options = robot::Options { profile: profile.into(), posture: posture.into(), seed, ..robot::Options::default() };
+        let options = robot::Options {
+            profile: profile.into(),
+            posture: posture.into(),
+            seed,
+            ..robot::Options::default()
+        };
         let mut plant = LockstepPlant::new(&configs(), &options).unwrap();
         let config = RobotConfig::load(&configs()).unwrap();
         let truth = plant.truth();

@@ -4,7 +4,7 @@
 //! moves; between two of them the gripper comes back to its start. Then [disturbances](trial::Case), each on
 //! several robots whose imperfections differ. Everything by the simulator's truth, with all imperfections on.
 
-mod monitor;
+pub(super) mod monitor;
 mod plot;
 mod table;
 mod targets;

@@ -102,6 +102,32 @@ impl Findings {
     }
 
     /// The robot is no longer where a trial can go on.
+    /// Joints against the ends of their ranges, their speeds and torques; what touches what it should not.
+    pub fn watch_limits(&mut self, sut: &mut Lockstep, model: &Model, mut touched: impl FnMut(&Unplanned)) {
+        let commanded = sut.command().torque;
+        let robot = sut.plant_mut().robot_mut();
+        let applied = *robot.applied_torques();
+        let world = robot.world_mut();
+        let (position, velocity) = (world.joint_position(), world.joint_velocity());
+        for joint in 0..JOINTS {
+            let over = (position[joint] - model.upper[joint]).max(model.lower[joint] - position[joint]);
+            self.position_over_rad.raise(over, joint);
+            self.speed_share.raise(velocity[joint].abs() / model.max_velocity[joint], joint);
+            let torque = if joint < 12 { applied[joint] } else { commanded[joint] };
+            self.torque_share.raise(torque.abs() / model.max_torque[joint], joint);
+        }
+        let (mut own, mut ground) = (false, false);
+        for contact in world.unplanned_contacts() {
+            match &contact {
+                Unplanned::OfItself(_) => own = true,
+                Unplanned::WithGround(_) => ground = true,
+            }
+            touched(&contact);
+        }
+        self.self_contacts += u64::from(own);
+        self.ground_contacts += u64::from(ground);
+    }
+
     pub fn is_over(&self) -> bool {
         self.falls + self.interventions > 0
     }
@@ -174,30 +200,12 @@ impl Monitor {
                 sut.snapshot().assessment,
             ));
         }
-        let commanded = sut.command().torque;
-        let robot = sut.plant_mut().robot_mut();
-        let applied = *robot.applied_torques();
-        let world = robot.world_mut();
-        let (position, velocity) = (world.joint_position(), world.joint_velocity());
-        for joint in 0..JOINTS {
-            let over = (position[joint] - model.upper[joint]).max(model.lower[joint] - position[joint]);
-            found.position_over_rad.raise(over, joint);
-            found.speed_share.raise(velocity[joint].abs() / model.max_velocity[joint], joint);
-            let torque = if joint < 12 { applied[joint] } else { commanded[joint] };
-            found.torque_share.raise(torque.abs() / model.max_torque[joint], joint);
-        }
-        let (mut own, mut ground) = (false, false);
-        for contact in world.unplanned_contacts() {
-            match contact {
-                Unplanned::OfItself(_) => own = true,
-                Unplanned::WithGround(_) => ground = true,
+        let touched = &mut self.touched;
+        found.watch_limits(sut, model, |contact| {
+            if !touched.contains(contact) {
+                touched.push(contact.clone());
             }
-            if !self.touched.contains(&contact) {
-                self.touched.push(contact);
-            }
-        }
-        found.self_contacts += u64::from(own);
-        found.ground_contacts += u64::from(ground);
+        });
         !found.is_over()
     }
 }

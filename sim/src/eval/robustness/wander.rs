@@ -56,7 +56,12 @@ pub fn wander(configs: &Path, profile: &str, seeds: &[u64]) -> anyhow::Result<Ve
         let mut robot = match sut.take() {
             Some(robot) => robot,
             None => {
-                let options = Options { profile: profile.into(), posture: "standing".into(), seed, ..Options::default() };
+                let options = Options {
+                    profile: profile.into(),
+                    posture: "standing".into(),
+                    seed,
+                    ..Options::default()
+                };
                 let mut robot = Lockstep::with_config(configs, config.clone(), &options)?;
                 robot.go_to(Mode::Gripper(side))?;
                 robot.run(0.5)?;

@@ -11,6 +11,8 @@ mod wander;
 
 use std::path::Path;
 
+pub(super) use start::{ready, velocity};
+
 use rayon::prelude::*;
 
 use super::{Figure, Must, Report};

@@ -52,7 +52,11 @@ pub fn survives(
                 s.torso.target.translation.vector.as_slice(),
                 super::start::tilt(&t),
                 t.world_from_torso.rotation.euler_angles(),
-                t.feet_in_world.map(|p| [p.x - t.world_from_torso.translation.x, p.y - t.world_from_torso.translation.y, p.z]),
+                t.feet_in_world.map(|p| [
+                    p.x - t.world_from_torso.translation.x,
+                    p.y - t.world_from_torso.translation.y,
+                    p.z
+                ]),
                 t.foot_force_n,
             );
         }

@@ -125,7 +125,8 @@ pub fn walk(configs: &Path, profile: &str, pace: &Pace, seed: u64) -> anyhow::Re
             let moved = (torso.translation.vector - last.translation.vector) / EXCHANGE_S;
             let frame = sut.controller().wbc().dynamics().frame(Frame::Torso);
             let estimated = frame.velocity.fixed_rows::<3>(0).into_owned();
-            let error = frame.world_from_frame.rotation.inverse() * estimated - torso.rotation.inverse() * moved;
+            let error =
+                frame.world_from_frame.rotation.inverse() * estimated - torso.rotation.inverse() * moved;
             outcome.velocity_error += error.norm_squared() / samples;
         }
         last = torso;
@@ -134,8 +135,11 @@ pub fn walk(configs: &Path, profile: &str, pace: &Pace, seed: u64) -> anyhow::Re
     let estimated_way = estimated_from.inv_mul(&sut.snapshot().torso.pose).translation.vector;
     let [x, y, turn] = pace.velocity;
     let along = Vector3::new(x, y, 0.0).try_normalize(1e-9).unwrap_or_default();
-    let (speed, wanted) =
-        if pace.is_turning() { (turned / MEASURED_S, turn) } else { (way.dot(&along) / MEASURED_S, x.hypot(y)) };
+    let (speed, wanted) = if pace.is_turning() {
+        (turned / MEASURED_S, turn)
+    } else {
+        (way.dot(&along) / MEASURED_S, x.hypot(y))
+    };
     outcome.speed = speed;
     outcome.speed_error = if pace.is_moving() { (speed / wanted - 1.0).abs() } else { 0.0 };
     outcome.height_error_m = (mean_height - height_m).abs();

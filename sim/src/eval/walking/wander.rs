@@ -39,7 +39,9 @@ pub fn falls_at(configs: &Path, profile: &str, seconds: f64, seed: u64) -> anyho
             sut.tick()?;
             if sut.truth().fallen {
                 let at_s = elapsed_s(sut.truth().time_ns);
-                tracing::info!("seed {seed}: fell after {at_s:.1} s at {speeds:.2?}, {height:.2} m, {turn:.2?}");
+                tracing::info!(
+                    "seed {seed}: fell after {at_s:.1} s at {speeds:.2?}, {height:.2} m, {turn:.2?}"
+                );
                 return Ok(Some(at_s));
             }
         }
