@@ -147,7 +147,7 @@ fn check_openings(openings: [(&'static str, Option<f64>); 2]) -> Result<(), Reje
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{Header, Waypoint};
+    use crate::messages::{Header, Velocity, Waypoint};
     use nalgebra::Isometry3;
     use proptest::prelude::*;
 
@@ -165,6 +165,7 @@ mod tests {
             mode_request_id: 1,
             mode: Mode::Stance.into(),
             trajectory: Some(through([1.0, 2.5])),
+            walk: Some(Velocity { forward_m_s: 0.3, left_m_s: 0.0, turn_rad_s: -0.5 }),
         }
     }
 

@@ -3,7 +3,7 @@
 use locoman_protocol::messages::foxglove::{CameraCalibration, CompressedImage, FrameTransforms};
 use locoman_protocol::messages::{
     ClockPing, ClockPong, Detections, Event, Header, Motions, OperatorCommand, Pose, Quaternion, RobotState,
-    ShellPose, SimTruth, Stop, Timing, Tracking, Trajectory, Vector3, Waypoint,
+    ShellPose, SimTruth, Stop, Timing, Tracking, Trajectory, Vector3, Velocity, Waypoint,
 };
 use locoman_protocol::{Topic, Wire, validate};
 use proptest::prelude::*;
@@ -72,12 +72,14 @@ prop_compose! {
         mode_request_id: u64,
         mode: i32,
         waypoints in prop::option::of(prop::collection::vec(waypoints(), 0..4)),
+        speeds in prop::option::of(prop::array::uniform3(any::<f64>())),
     ) -> OperatorCommand {
         let [torso, right_palm, left_palm] = bodies;
         let [right_opening, left_opening] = openings;
         OperatorCommand {
             header, engagement, device, torso, right_palm, left_palm, right_opening, left_opening,
             mode_request_id, mode, trajectory: waypoints.map(|waypoints| Trajectory { waypoints }),
+            walk: speeds.map(|[forward_m_s, left_m_s, turn_rad_s]| Velocity { forward_m_s, left_m_s, turn_rad_s }),
         }
     }
 }

@@ -10,10 +10,11 @@ use counting_allocator::counted;
 use locoman_robot::{
     control::Inputs,
     joints::Side,
-    modes::{Mode, Phase},
+    locomotion::Velocity,
+    modes::{Arms, Mode, Phase},
     plant::Plant,
 };
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector2};
 use session::Session;
 
 /// Runs for a while with the operator as he is; returns what the control steps allocated.
@@ -47,8 +48,15 @@ fn the_control_step_allocates_nothing_in_any_phase() {
     sut.operator().engagement = 1;
     sut.operator().palms[0] = Some(Isometry3::translation(0.05, 0.0, 0.02));
     allocated += allocations(&mut sut, 1.0);
-    sut.operator().mode = Some(Mode::LieDown);
+    sut.operator().mode = Some(Mode::LocoManipulation(Arms::Both));
     sut.operator().mode_request = 2;
+    allocated += allocations(&mut sut, 12.0);
+    assert_eq!(sut.snapshot().phase, Phase::WalkHolding(Arms::Both));
+    sut.operator().engagement = 2;
+    sut.operator().walk = Some(Velocity { linear: Vector2::new(0.3, 0.1), turn: 0.3 });
+    allocated += allocations(&mut sut, 2.0);
+    sut.operator().mode = Some(Mode::LieDown);
+    sut.operator().mode_request = 3;
     allocated += allocations(&mut sut, 14.0);
     assert_eq!(sut.snapshot().phase, Phase::Damped);
     assert_eq!(allocated, 0);

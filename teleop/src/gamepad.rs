@@ -1,9 +1,9 @@
 //! A gamepad at this computer, read by gilrs on a thread of its own.
 //!
-//! Right shoulder: dead-man. Left stick: x and y; triggers: down and up; right stick: pitch and yaw, with the
+//! Right shoulder: dead-man. Left stick: x and y, or where to walk; triggers: down and up; right stick: pitch and yaw, with the
 //! left shoulder held pitch and roll; sticks pressed: open, close. Centre (Guide): torso, or foot or gripper.
-//! South (A): stance, East (B): right gripper, West (X): left gripper, D-pad right and left: right and left
-//! foot, Start: lie down, Select (Back): stop, twice: damp.
+//! South (A): stance, North (Y): walk, East (B): right gripper, West (X): left gripper, D-pad right and left: right and left
+//! foot, D-pad up and down: walk with the right and the left arm in use, Start: lie down, Select (Back): stop, twice: damp.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -54,6 +54,9 @@ fn run(mut gilrs: Gilrs, board: &Board, stop: &StopButton) {
 fn pressed(button: Button, target: &mut Target, board: &Board, stop: &StopButton) {
     let mode = match button {
         Button::South => Mode::Stance,
+        Button::North => Mode::Locomotion,
+        Button::DPadUp => Mode::RightLocoManipulation,
+        Button::DPadDown => Mode::LeftLocoManipulation,
         Button::East => Mode::RightGripper,
         Button::West => Mode::LeftGripper,
         Button::DPadRight => Mode::RightFoot,

@@ -38,6 +38,8 @@ pub struct Motion {
     pub bodies: [Option<Isometry3<f64>>; 3],
     /// Gripper openings right, left: 0 closed, 1 open.
     pub openings: [Option<f64>; 2],
+    /// How to walk: forward and left, m/s, turning, rad/s; `None`: as the torso's displacement says.
+    pub walk: Option<[f64; 3]>,
 }
 
 impl Motion {

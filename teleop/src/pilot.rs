@@ -10,7 +10,7 @@
 //! 4. Without a driver the command says "hold" (engagement 0); it is sent all the same.
 
 use locoman_protocol::geometry;
-use locoman_protocol::messages::{Device, Mode, OperatorCommand, Severity};
+use locoman_protocol::messages::{Device, Mode, OperatorCommand, Severity, Velocity};
 
 use crate::auto::{Auto, Step};
 use crate::config::Config;
@@ -269,7 +269,11 @@ impl Pilot {
             Source::Sticks(sticks) => {
                 let hand =
                     if engagement.device == Device::Joystick { &inputs.joystick } else { &inputs.browser };
-                engagement.motion = sticks.advance(hand, robot.and_then(RobotView::side), dt_s);
+                engagement.motion = {
+                    let (side, walks) =
+                        (robot.and_then(RobotView::side), robot.is_some_and(RobotView::walks));
+                    sticks.advance(hand, side, walks, dt_s)
+                };
                 engagement.capture_ns = now_ns;
             }
             Source::Tracker(mapper) => {
@@ -306,6 +310,11 @@ impl Pilot {
             left_palm: body(Body::LeftPalm),
             right_opening: engagement.motion.openings[0],
             left_opening: engagement.motion.openings[1],
+            walk: engagement.motion.walk.map(|[forward_m_s, left_m_s, turn_rad_s]| Velocity {
+                forward_m_s,
+                left_m_s,
+                turn_rad_s,
+            }),
             ..idle
         };
         (command, engagement.capture_ns)

@@ -41,9 +41,19 @@ impl RobotView {
     pub fn side(&self) -> Option<usize> {
         match self.mode {
             _ if self.goal != self.mode => None,
-            Mode::RightGripper | Mode::RightFoot => Some(0),
-            Mode::LeftGripper | Mode::LeftFoot => Some(1),
+            Mode::RightGripper | Mode::RightFoot | Mode::RightLocoManipulation => Some(0),
+            Mode::LeftGripper | Mode::LeftFoot | Mode::LeftLocoManipulation => Some(1),
             _ => None,
         }
+    }
+
+    /// Whether it walks when it is told to.
+    pub fn walks(&self) -> bool {
+        use Mode::{LeftLocoManipulation, LocoManipulation, Locomotion, RightLocoManipulation};
+        self.goal == self.mode
+            && matches!(
+                self.mode,
+                Locomotion | LocoManipulation | RightLocoManipulation | LeftLocoManipulation
+            )
     }
 }

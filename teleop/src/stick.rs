@@ -69,16 +69,25 @@ impl StickMotion {
     }
 
     /// Moves on by `dt_s`. `side` (0 right, 1 left) is the one that the robot manipulates with now, by foot or
-    /// gripper; of a foot's motion the robot takes the translation.
-    pub fn advance(&mut self, hand: &Hand, side: Option<usize>, dt_s: f64) -> Motion {
+    /// gripper; of a foot's motion the robot takes the translation. A robot that `walks` goes as the sticks for the torso's
+    /// x, y and yaw say.
+    pub fn advance(&mut self, hand: &Hand, side: Option<usize>, walks: bool, dt_s: f64) -> Motion {
         let linear = Vector3::from(hand.linear.map(|v| self.deflection(v)));
         let angular = Vector3::from(hand.angular.map(|v| self.deflection(v)));
         let c = &self.config;
+        let mut walk = walks.then_some([0.0; 3]);
         match side.filter(|_| hand.target == Target::Effector) {
             Some(side) => {
                 let pose =
                     moved(&self.effectors[side], linear * c.gripper_m_s, angular * c.gripper_rad_s, dt_s);
                 self.effectors[side] = within(&pose, c.gripper_limit_m, c.gripper_limit_rad);
+            }
+            None if walks => {
+                let (along, turn) = (linear.xy() * c.walk_m_s, angular.z * c.walk_rad_s);
+                walk = Some([along.x, along.y, turn]);
+                let rise = Vector3::new(0.0, 0.0, linear.z * c.torso_z_m_s);
+                let tilt = Vector3::new(angular.x, angular.y, 0.0) * c.torso_rad_s;
+                self.torso = torso_within(&moved(&self.torso, rise, tilt, dt_s), c);
             }
             None => {
                 let speed = Vector3::new(c.torso_xy_m_s, c.torso_xy_m_s, c.torso_z_m_s);
@@ -86,7 +95,7 @@ impl StickMotion {
                 self.torso = torso_within(&pose, c);
             }
         }
-        let mut motion = Motion { bodies: [Some(self.torso), None, None], openings: [None; 2] };
+        let mut motion = Motion { bodies: [Some(self.torso), None, None], openings: [None; 2], walk };
         if let Some(side) = side {
             let step = self.deflection(hand.opening) * self.config.opening_per_s * dt_s;
             self.openings[side] = (self.openings[side] + step).clamp(0.0, 1.0);
@@ -148,7 +157,7 @@ mod tests {
         let mut sut = StickMotion::engage(&config, [0.5; 2]);
         let mut motion = Motion::default();
         for _ in 0..100 {
-            motion = sut.advance(&forward(Target::Effector), Some(0), 0.01);
+            motion = sut.advance(&forward(Target::Effector), Some(0), false, 0.01);
         }
         assert!((motion.body(Body::RightPalm).unwrap().translation.x - config.gripper_m_s).abs() < 1e-9);
         assert_eq!(motion.body(Body::Torso), Some(&Isometry3::identity()));
@@ -159,28 +168,46 @@ mod tests {
     #[test]
     fn on_four_feet_the_sticks_move_the_torso() {
         let mut sut = StickMotion::engage(&Stick::default(), [0.0; 2]);
-        let motion = sut.advance(&forward(Target::Effector), None, 0.1);
+        let motion = sut.advance(&forward(Target::Effector), None, false, 0.1);
         assert!(motion.body(Body::Torso).unwrap().translation.x > 0.0);
         assert_eq!(motion.body(Body::RightPalm), None);
+    }
+
+    #[test]
+    fn a_robot_that_walks_goes_as_the_sticks_say_and_stops_when_they_are_let_go() {
+        let config = Stick::default();
+        let mut sut = StickMotion::engage(&config, [0.0; 2]);
+        let turning = Hand { angular: [0.0, 0.0, -1.0], ..forward(Target::Torso) };
+        let motion = sut.advance(&turning, None, true, 0.1);
+        assert_eq!(motion.walk, Some([config.walk_m_s, 0.0, -config.walk_rad_s]));
+        assert_eq!(motion.body(Body::Torso), Some(&Isometry3::identity()));
+        let rest = Hand { held: true, ..Hand::default() };
+        assert_eq!(sut.advance(&rest, None, true, 0.1).walk, Some([0.0; 3]));
+        // The sticks turn a gripper: the robot stays where it is.
+        let motion = sut.advance(&forward(Target::Effector), Some(0), true, 0.1);
+        assert_eq!(motion.walk, Some([0.0; 3]));
     }
 
     proptest! {
         #[test]
         fn whatever_a_device_reports_the_displacement_is_finite_and_within_its_limits(
             linear in prop::array::uniform3(any::<f64>()), angular in prop::array::uniform3(any::<f64>()),
-            opening in any::<f64>(), steps in 1..400usize, side in prop::option::of(0..2usize),
+            opening in any::<f64>(), steps in 1..400usize, side in prop::option::of(0..2usize), walks: bool,
         ) {
             let config = Stick::default();
             let hand = Hand { held: true, target: Target::Effector, linear, angular, opening, ..Hand::default() };
             let mut sut = StickMotion::engage(&config, [f64::NAN, 2.0]);
             for _ in 0..steps {
-                let motion = sut.advance(&hand, side, 0.1);
+                let motion = sut.advance(&hand, side, walks, 0.1);
                 let torso = motion.body(Body::Torso).unwrap().translation.vector;
                 prop_assert!(torso.xy().amax() <= config.torso_xy_limit_m && torso.z.abs() <= config.torso_z_limit_m);
                 for pose in motion.bodies.iter().flatten() {
                     prop_assert!(pose.translation.vector.norm() <= config.gripper_limit_m + 1e-9);
                     prop_assert!(pose.rotation.angle().is_finite());
                 }
+                let fastest = config.walk_m_s.max(config.walk_rad_s);
+                prop_assert!(motion.walk.is_some() == walks);
+                prop_assert!(motion.walk.iter().flatten().all(|speed| speed.abs() <= fastest));
                 prop_assert!(motion.openings.iter().flatten().all(|o| (0.0..=1.0).contains(o)));
             }
         }
@@ -188,7 +215,7 @@ mod tests {
         #[test]
         fn a_stick_at_rest_moves_nothing(v in prop::array::uniform3(-0.0999..0.0999f64)) {
             let mut sut = StickMotion::engage(&Stick::default(), [0.0; 2]);
-            let motion = sut.advance(&Hand { held: true, linear: v, angular: v, ..Hand::default() }, Some(1), 1.0);
+            let motion = sut.advance(&Hand { held: true, linear: v, angular: v, ..Hand::default() }, Some(1), false, 1.0);
             prop_assert_eq!(motion.body(Body::Torso), Some(&Isometry3::identity()));
             prop_assert_eq!(motion.body(Body::LeftPalm), Some(&Isometry3::identity()));
         }

@@ -91,14 +91,14 @@ pub struct Compensation {
     /// Share of the load of each foot in the last step.
     share: [f64; 4],
     /// Whether offsets grow.
-    learns: bool,
+    legs_learn: bool,
 }
 
 impl Compensation {
     /// Knows nothing yet.
     pub fn new(settings: CompensationSettings) -> Self {
         let (offset, friction) = (JointVector::zeros(), JointVector::zeros());
-        Self { settings, offset, friction, share: [0.0; 4], learns: true }
+        Self { settings, offset, friction, share: [0.0; 4], legs_learn: true }
     }
 
     /// Forgets the offsets, which belong to a load and a posture; friction is the joint's own.
@@ -107,10 +107,10 @@ impl Compensation {
         self.share = [0.0; 4];
     }
 
-    /// Whether offsets grow. They must not while a foot seeks the ground: one that touches and does not feel it
-    /// would press harder and harder.
-    pub fn set_learning(&mut self, learns: bool) {
-        self.learns = learns;
+    /// Whether the legs' offsets grow. They must not while a foot seeks the ground: one that touches and does not feel it
+    /// would press harder and harder. A leg that walks has no load for long enough.
+    pub fn set_legs_learn(&mut self, learn: bool) {
+        self.legs_learn = learn;
     }
 
     /// Learns from the step q̄ - q, and adds to a command for q̄ what was learned.
@@ -129,7 +129,7 @@ impl Compensation {
             let error = step[joint].clamp(-cap, cap) * dt_s;
             let direction = (command.velocity[joint] / self.settings.friction_speed_rad_s).tanh();
 
-            let rate = if self.learns { rate } else { 0.0 };
+            let rate = if self.legs_learn || joint / 3 >= Leg::ALL.len() { rate } else { 0.0 };
             let offset = self.offset[joint] + rate * error;
             self.offset[joint] = offset.clamp(-of.max_offset_rad, of.max_offset_rad);
             let friction = self.friction[joint] + of.friction_rate * error * direction;

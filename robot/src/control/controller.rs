@@ -320,7 +320,7 @@ impl Controller {
                     JointGains::vectors(gains.balance_kp, gains.balance_kd)
                 };
                 let mut command = JointCommand { position, velocity, torque, kp, kd, opening };
-                self.compensation.set_learning(!matches!(phase, Phase::LowerFoot(_)) && !walks);
+                self.compensation.set_legs_learn(!matches!(phase, Phase::LowerFoot(_)) && !walks);
                 self.compensation.apply(
                     &self.config.model,
                     &(position - state.position),

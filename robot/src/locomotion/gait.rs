@@ -82,7 +82,8 @@ impl Gait {
         self.frequency_hz = (frequency_hz + hurry_hz_s_m * off_course_m_s.max(0.0)).min(fastest_hz);
     }
 
-    /// One step of the clock, with the vertical forces of the feet, N. It halts, if it `may`, when all feet stand.
+    /// One step of the clock, with the vertical forces of the feet, N. If it may halt no foot lifts any more, and it halts
+    /// when all stand.
     pub fn step(&mut self, dt_s: f64, may_halt: bool, foot_force: &[f64; 4]) {
         let all_stand = self.legs.iter().all(|leg| matches!(leg, LegPhase::Stance { .. }));
         if may_halt && all_stand {
@@ -95,23 +96,21 @@ impl Gait {
             self.phase = (self.phase + dt_s * self.frequency_hz).fract();
         }
         for leg in Leg::ALL {
-            self.step_leg(leg, dt_s, foot_force[leg.index()]);
+            self.step_leg(leg, dt_s, may_halt, foot_force[leg.index()]);
         }
     }
 
-    fn step_leg(&mut self, leg: Leg, dt_s: f64, force_n: f64) {
+    fn step_leg(&mut self, leg: Leg, dt_s: f64, may_halt: bool, force_n: f64) {
         let planned_stance = self.halted || self.local(leg) < self.pattern.duty;
         let touches = force_n > self.events.touch_n;
-        let may_lift = self.may_lift(leg);
+        let may_lift = !may_halt && self.may_lift(leg);
         let place = leg.index();
         if planned_stance {
             self.due[place] = true;
         }
         self.legs[place] = match self.legs[place] {
-            LegPhase::Stance { for_s } if !planned_stance && self.due[place] && may_lift => {
+            LegPhase::Stance { .. } if !planned_stance && self.due[place] && may_lift => {
                 self.due[place] = false;
-                // A stance that was cut short by nothing: the swing begins where the clock has it.
-                let _ = for_s;
                 LegPhase::Swing { progress: 0.0 }
             }
             LegPhase::Stance { for_s } => LegPhase::Stance { for_s: for_s + dt_s },
@@ -150,5 +149,85 @@ impl Gait {
             }
         }
         contacts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::locomotion::LocomotionSettings;
+
+    const DT_S: f64 = 0.0025;
+
+    fn sut() -> Gait {
+        let LocomotionSettings { gait, contact, .. } = LocomotionSettings::default();
+        Gait::halted(gait, contact)
+    }
+
+    fn in_the_air(gait: &Gait) -> usize {
+        Leg::ALL.iter().filter(|leg| matches!(gait.leg(**leg), LegPhase::Swing { .. })).count()
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_the_feet_feel_two_stand_at_least(
+            forces in prop::collection::vec(prop::array::uniform4(0.0..60.0f64), 1..400),
+            off_course in 0.0..3.0f64,
+        ) {
+            let mut sut = sut();
+            for force in &forces {
+                sut.hurry(off_course);
+                for _ in 0..5 {
+                    sut.step(DT_S, false, force);
+                    prop_assert!(in_the_air(&sut) <= 2);
+                    prop_assert!(sut.contacts().legs().count() + in_the_air(&sut) == 4);
+                }
+            }
+        }
+
+        #[test]
+        fn it_halts_on_four_feet_from_any_instant_and_begins_again(walks_s in 0.0..3.0f64) {
+            let mut sut = sut();
+            // A foot that was in the air for 0.2 s feels the ground.
+            let step = |sut: &mut Gait, may_halt: bool| {
+                let force = Leg::ALL.map(|leg| match sut.leg(leg) {
+                    LegPhase::Swing { progress } if progress < 0.9 => 0.0,
+                    _ => 33.0,
+                });
+                sut.step(DT_S, may_halt, &force);
+            };
+            for _ in 0..(walks_s / DT_S) as usize {
+                step(&mut sut, false);
+            }
+            for _ in 0..200 {
+                step(&mut sut, true);
+            }
+            prop_assert!(sut.is_halted());
+            prop_assert_eq!(sut.contacts(), ContactSet::STANCE);
+            let mut lifted = [false; 4];
+            for _ in 0..400 {
+                step(&mut sut, false);
+                for leg in Leg::ALL {
+                    lifted[leg.index()] |= matches!(sut.leg(leg), LegPhase::Swing { .. });
+                }
+            }
+            prop_assert_eq!(lifted, [true; 4]);
+        }
+    }
+
+    #[test]
+    fn a_foot_that_misses_the_ground_searches_until_it_feels_it() {
+        let mut sut = sut();
+        for _ in 0..400 {
+            sut.step(DT_S, false, &[0.0; 4]);
+        }
+        let late = Leg::ALL
+            .iter()
+            .find(|leg| matches!(sut.leg(**leg), LegPhase::Swing { progress } if progress > 1.0));
+        let late = *late.unwrap();
+        sut.step(DT_S, false, &[33.0; 4]);
+        assert_eq!(sut.leg(late), LegPhase::Stance { for_s: 0.0 });
     }
 }

@@ -18,8 +18,8 @@ pub use course::{Course, Velocity};
 pub use gait::{Gait, LegPhase};
 pub use placement::{GroundPlane, Motion, landing};
 pub use settings::{
-    ContactEvents, CourseSettings, GaitSettings, LocomotionSettings, PlacementSettings, SwingSettings,
-    TrimSettings, WalkingGains,
+    ContactEvents, CourseSettings, GaitSettings, HoldingSettings, LocomotionSettings, PlacementSettings,
+    SwingSettings, TrimSettings, WalkingGains,
 };
 pub use swing::Swing;
 pub use walker::{Steps, Walker};

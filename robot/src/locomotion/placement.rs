@@ -94,3 +94,56 @@ impl GroundPlane {
         mean.z + slope.dot(&(at - mean.xy()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::locomotion::LocomotionSettings;
+
+    fn motion(velocity: Vector2<f64>, wanted: Vector2<f64>, heading: f64) -> Motion {
+        Motion { position: Vector2::new(0.3, -0.2), heading, velocity, wanted, turn: 0.0 }
+    }
+
+    proptest! {
+        #[test]
+        fn at_a_steady_pace_the_body_passes_over_the_foot_in_the_middle_of_its_stance(
+            x in -0.6..0.6f64, y in -0.05..0.05f64, heading in -3.0..3.0f64,
+        ) {
+            let settings = LocomotionSettings::default().placement;
+            let velocity = Rotation2::new(heading) * Vector2::new(x, y);
+            let motion = motion(velocity, velocity, heading);
+            for leg in Leg::ALL {
+                let far = motion.position + Rotation2::new(heading) * place_of(leg.across(), &settings);
+                let spot = landing(leg, &motion, [0.1, 0.275], &far, &settings);
+                let over = motion.position + velocity * (0.1 + 0.275 / 2.0);
+                let place = Rotation2::new(-heading) * (spot - over);
+                prop_assert!((place - place_of(leg, &settings)).norm() < 1e-9);
+            }
+        }
+
+        #[test]
+        fn feet_stay_on_their_sides_whatever_throws_the_robot(
+            x in -4.0..4.0f64, y in -4.0..4.0f64, heading in -3.0..3.0f64,
+        ) {
+            let settings = LocomotionSettings::default().placement;
+            let motion = motion(Vector2::new(x, y), Vector2::zeros(), heading);
+            for leg in Leg::ALL {
+                let far = motion.position + Rotation2::new(heading) * place_of(leg.across(), &settings);
+                let spot = landing(leg, &motion, [0.1, 0.2], &far, &settings);
+                let apart = Rotation2::new(-heading) * (spot - far);
+                let outward = place_of(leg, &settings).y.signum();
+                prop_assert!(outward * apart.y >= settings.apart_m - 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn the_ground_is_the_plane_through_the_feet() {
+        let slope = |x: f64, y: f64| Vector3::new(x, y, 0.1 * x - 0.05 * y + 0.02);
+        let feet = [slope(0.2, -0.15), slope(0.2, 0.15), slope(-0.2, -0.15), slope(-0.2, 0.15)];
+        let height = GroundPlane::new(feet).height(&Vector2::new(0.3, 0.1));
+        assert!((height - 0.045).abs() < 2e-3, "{height}");
+    }
+}

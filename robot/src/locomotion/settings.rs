@@ -17,10 +17,35 @@ pub struct LocomotionSettings {
     pub swing: SwingSettings,
     /// How the torso goes along.
     pub course: CourseSettings,
+    /// What is different while arms hold something.
+    pub holding: HoldingSettings,
     /// What is learned of the torso's lean.
     pub trim: TrimSettings,
     /// Legs, N m/rad and N m s/rad.
     pub gains: WalkingGains,
+}
+
+impl LocomotionSettings {
+    /// The same while arms hold something.
+    #[must_use]
+    pub fn for_holding(&self) -> Self {
+        let HoldingSettings { frequency_hz, height_m } = self.holding;
+        Self {
+            gait: GaitSettings { frequency_hz, ..self.gait },
+            swing: SwingSettings { height_m, ..self.swing },
+            ..*self
+        }
+    }
+}
+
+/// What is different while arms hold something: the less a leg moves, the less its arm has to make up for.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HoldingSettings {
+    /// Cycles a second.
+    pub frequency_hz: f64,
+    /// Clearance in the middle of the swing, m.
+    pub height_m: f64,
 }
 
 /// A cyclic gait.
@@ -165,6 +190,7 @@ impl Default for LocomotionSettings {
                 ground_s: 0.1,
                 balance_m: 0.05,
             },
+            holding: HoldingSettings { frequency_hz: 2.7, height_m: 0.02 },
             trim: TrimSettings { rate: 2.0, most_m: 0.03, most_rad: 0.15 },
             gains: WalkingGains { kp: 60.0, kd: 2.0 },
         }

@@ -75,3 +75,45 @@ impl Swing {
         reference
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::locomotion::LocomotionSettings;
+
+    const DURATION_S: f64 = 0.225;
+
+    fn place() -> impl Strategy<Value = Vector3<f64>> {
+        (-0.2..0.2f64, -0.2..0.2f64, -0.05..0.05f64).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn it_leaves_and_lands_at_rest_and_clears_both_ends(from in place(), to in place()) {
+            let settings = LocomotionSettings::default().swing;
+            let mut sut = Swing::new(from, DURATION_S);
+            sut.aim(to);
+            let (first, last) = (sut.sample(0.0, &settings), sut.sample(1.0, &settings));
+            prop_assert!((first.position - from).norm() < 1e-12 && first.velocity.norm() < 1e-9);
+            prop_assert!((last.position - to).norm() < 1e-12 && last.velocity.norm() < 1e-9);
+            let middle = sut.sample(0.5, &settings).position.z;
+            prop_assert!((middle - from.z.max(to.z) - settings.height_m).abs() < 1e-9);
+        }
+
+        #[test]
+        fn velocity_and_acceleration_are_those_of_the_way(from in place(), to in place(), s in 0.02..0.98f64) {
+            prop_assume!((s - 0.5).abs() > 0.01);
+            const H: f64 = 1e-5;
+            let settings = LocomotionSettings::default().swing;
+            let mut sut = Swing::new(from, DURATION_S);
+            sut.aim(to);
+            let at = |s: f64| sut.sample(s, &settings);
+            let slope = (at(s + H).position - at(s - H).position) / (2.0 * H * DURATION_S);
+            prop_assert!((slope - at(s).velocity).norm() < 1e-5);
+            let bend = (at(s + H).velocity - at(s - H).velocity) / (2.0 * H * DURATION_S);
+            prop_assert!((bend - at(s).acceleration).norm() < 1e-3);
+        }
+    }
+}

@@ -25,6 +25,8 @@ const RESTING_RAD_S: f64 = 0.02;
 const STEPS_AFTER: f64 = 1.2;
 /// The velocity of a robot that walks undisturbed is off its course by so much within a step, m/s.
 const STRIDE_M_S: f64 = 0.15;
+/// Time constant in which its sway is averaged out, s: a cycle.
+const SWAY_S: f64 = 0.5;
 /// Time constant with which the middle of the robot is found, s: longer than a step.
 const MIDDLE_S: f64 = 0.5;
 
@@ -54,6 +56,8 @@ pub struct Walker {
     /// What the torso's height, roll and pitch are asked to be beyond what they should be, for they come out too small
     /// by it: m, and a rotation vector in the world.
     trim: (f64, Vector3<f64>),
+    /// From the middle of the feet to the point where the robot could come to rest, without its sway, m.
+    off_balance: Vector2<f64>,
     /// How long the robot has been at rest, s.
     resting_s: f64,
 }
@@ -71,6 +75,7 @@ impl Walker {
             ground_m: ground.height(&from_above(&torso.translation.vector)),
             middle: middle(scene),
             trim: (0.0, Vector3::zeros()),
+            off_balance: Vector2::zeros(),
             resting_s: f64::INFINITY,
             settings,
             gait,
@@ -139,8 +144,11 @@ impl Walker {
         let limited = wanted.limited(&self.settings.course);
         let going =
             |velocity: &Velocity| velocity.linear.norm() > RESTING_M_S || velocity.turn.abs() > RESTING_RAD_S;
-        let settings = &self.settings.course;
-        let off_balance = self.off_balance(scene) > settings.balance_m;
+        // Within a step the robot sways from foot to foot; only what lasts longer keeps it stepping.
+        let off_balance = self.off_balance(scene);
+        let share = if self.is_halted() { 1.0 } else { (scene.dt_s / SWAY_S).min(1.0) };
+        self.off_balance += (off_balance - self.off_balance) * share;
+        let off_balance = self.off_balance.norm() > self.settings.course.balance_m;
         if going(&limited) || going(&self.course.velocity) || off_balance {
             self.resting_s = 0.0;
         } else {
@@ -150,14 +158,14 @@ impl Walker {
     }
 
     /// How far the point where the robot could come to rest is from the middle of its feet.
-    fn off_balance(&self, scene: &Scene<'_>) -> f64 {
+    fn off_balance(&self, scene: &Scene<'_>) -> Vector2<f64> {
         let feet = Leg::ALL.map(|leg| from_above(&scene.foot(leg)));
         let between = feet.iter().sum::<Vector2<f64>>() / 4.0;
         let state = scene.state;
         let velocity = state.world_from_torso * state.torso_twist.fixed_rows::<3>(0).into_owned();
         let height = (scene.com.z - self.ground_m).max(0.05);
         let capture = from_above(&scene.com) + from_above(&velocity) * (height / GRAVITY).sqrt();
-        (capture - between).norm()
+        capture - between
     }
 
     fn motion(&self, scene: &Scene<'_>) -> Motion {

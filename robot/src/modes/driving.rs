@@ -101,7 +101,8 @@ impl Driving {
     /// Takes over a robot that stands, to walk.
     pub fn begin_walk(&mut self, arms: Option<Arms>, setpoint: &Setpoint, scene: &Scene<'_>) {
         self.effector = None;
-        let walker = Walker::new(self.walking, scene);
+        let walking = if arms.is_some() { self.walking.for_holding() } else { self.walking };
+        let walker = Walker::new(walking, scene);
         let posture = walker.posture_of(&setpoint.torso);
         self.torso = DrivenBody::new(posture, self.limits.follower_rad_s, self.limits.stance_torso_rate);
         self.walker = Some((walker, arms));

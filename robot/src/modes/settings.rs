@@ -41,7 +41,7 @@ impl Default for PoseSettings {
             fold_rad: Vector3::new(0.0, 1.39, -2.78),
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
-            left_carry_rad: Vector3::new(-2.24, 0.0, 0.0),
+            left_carry_rad: Vector3::new(-2.24, 0.3, 0.0),
             stand_height_m: 0.265,
             rise_m: 0.04,
             shift_margin_m: 0.07,

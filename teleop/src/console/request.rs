@@ -28,6 +28,10 @@ pub(super) enum ModeName {
     LeftGripper,
     RightFoot,
     LeftFoot,
+    Locomotion,
+    RightLocoManipulation,
+    LeftLocoManipulation,
+    LocoManipulation,
     LieDown,
 }
 
@@ -39,6 +43,10 @@ impl From<ModeName> for Mode {
             ModeName::LeftGripper => Self::LeftGripper,
             ModeName::RightFoot => Self::RightFoot,
             ModeName::LeftFoot => Self::LeftFoot,
+            ModeName::Locomotion => Self::Locomotion,
+            ModeName::RightLocoManipulation => Self::RightLocoManipulation,
+            ModeName::LeftLocoManipulation => Self::LeftLocoManipulation,
+            ModeName::LocoManipulation => Self::LocoManipulation,
             ModeName::LieDown => Self::LieDown,
         }
     }

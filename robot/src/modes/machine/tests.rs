@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::*;
+use crate::modes::mode::Arms;
 
 fn calm() -> Inputs {
     Inputs {
@@ -147,7 +148,7 @@ fn r_safe_012_while_stopping_nothing_else_is_accepted() {
     assert_eq!(run(&mut sut, &stopping).last(), Some(&Phase::Damped));
 }
 
-const MODES: [Mode; 7] = [
+const MODES: [Mode; 11] = [
     Mode::Damped,
     Mode::Stance,
     Mode::LieDown,
@@ -155,6 +156,10 @@ const MODES: [Mode; 7] = [
     Mode::Foot(Side::Left),
     Mode::Gripper(Side::Right),
     Mode::Gripper(Side::Left),
+    Mode::Locomotion,
+    Mode::LocoManipulation(Arms::One(Side::Right)),
+    Mode::LocoManipulation(Arms::One(Side::Left)),
+    Mode::LocoManipulation(Arms::Both),
 ];
 
 /// All states that any inputs can lead to within `depth` steps.
@@ -233,6 +238,10 @@ fn from_every_state_every_mode_is_reached_without_a_step_from_foot_to_foot() {
                 // A foot that is up comes down on its own way, and only then do others go up.
                 let down = matches!(step[0], Phase::LowerFoot(_) | Phase::LiftFoot(_));
                 assert!(from.is_none() || to.is_some() || down, "{state:?}: {way:?}");
+                // A robot that walks stands still before anything else begins, but for its other arm's work.
+                if step[0].is_walking() && step[0] != Phase::Halt {
+                    assert_eq!(step[1], Phase::Halt, "{state:?}: {way:?}");
+                }
                 // The arm is folded before the foot goes down.
                 if let Phase::LowerFoot(side) = step[1] {
                     assert_eq!(step[0], Phase::Stow(side));

@@ -57,6 +57,8 @@ pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyho
             report.push(mean);
             report.push(greatest);
         }
+        let about_vertical = outcomes.iter().map(|outcome| outcome.about_vertical_rad).sum::<f64>();
+        report.push(figure("mean_about_vertical", about_vertical / outcomes.len() as f64, "rad"));
         shown.extend(outcomes.into_iter().next().map(|outcome| (name, outcome)));
     }
     if let Some(path) = plot {

@@ -38,6 +38,8 @@ pub struct Outcome {
     pub fallen: bool,
     /// Angle between where the gripper should point and where it does, over time, the worse of two grippers, rad.
     pub errors_rad: Vec<f64>,
+    /// Mean of its part about the vertical, which is that of the estimated heading too, rad.
+    pub about_vertical_rad: f64,
 }
 
 impl Outcome {
@@ -90,9 +92,14 @@ pub fn point(configs: &Path, profile: &str, task: Task, seed: u64) -> anyhow::Re
                 Task::Held(_) => Body::Gripper(*side).reference(&sut).rotation,
                 Task::Vanilla => *held,
             };
-            truth(*side, sut.truth(), &sim_from_world).rotation.angle_to(&wanted)
+            let error =
+                (truth(*side, sut.truth(), &sim_from_world).rotation * wanted.inverse()).scaled_axis();
+            (error.norm(), error.z.abs())
         };
-        outcome.errors_rad.push(sides.iter().zip(&held).map(error).fold(0.0, f64::max));
+        let worse = |a: (f64, f64), b: (f64, f64)| if a.0 > b.0 { a } else { b };
+        let (error, about_vertical) = sides.iter().zip(&held).map(error).fold((0.0, 0.0), worse);
+        outcome.errors_rad.push(error);
+        outcome.about_vertical_rad += about_vertical / ticks(POINTS_S) as f64;
     }
     Ok(outcome)
 }
