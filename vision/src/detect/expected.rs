@@ -12,6 +12,7 @@
 //! in [`fit`].
 
 mod align;
+mod bend;
 mod fit;
 mod pattern;
 mod places;
@@ -40,6 +41,8 @@ pub struct Expectation {
     pub id: u32,
     /// Homography from cell coordinates (see [`Expectation::from_pose`]) to the ideal image (x/z, y/z).
     pub ideal_from_cells: Matrix3<f64>,
+    /// How it moves: what the ideal image shows at (x, y) moves as M (x, y, 1) does, a second later; zero at rest.
+    pub ideal_rate: Matrix3<f64>,
     /// How far off it may be, pixels.
     pub doubt_px: f64,
 }
@@ -128,7 +131,12 @@ impl Expectation {
         let rotation = camera_from_tag.rotation.to_rotation_matrix();
         let (x, y) = (rotation.matrix().column(0) * cell_m, rotation.matrix().column(1) * -cell_m);
         let origin = camera_from_tag.translation.vector - (x + y) * MIDDLE;
-        Self { id, ideal_from_cells: Matrix3::from_columns(&[x, y, origin]), doubt_px }
+        Self {
+            id,
+            ideal_from_cells: Matrix3::from_columns(&[x, y, origin]),
+            ideal_rate: Matrix3::zeros(),
+            doubt_px,
+        }
     }
 
     /// Where a search has found a tag: its corners as this module reports them.
@@ -156,7 +164,7 @@ impl Expectation {
         }
         let h = matrix.lu().solve(&right)?;
         let ideal_from_cells = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
-        Some(Self { id, ideal_from_cells, doubt_px })
+        Some(Self { id, ideal_from_cells, ideal_rate: Matrix3::zeros(), doubt_px })
     }
 }
 
@@ -176,7 +184,7 @@ impl Reader {
     pub fn read(&mut self, image: &GrayImage, expectation: &Expectation) -> Result<Reading, Refusal> {
         let Self { camera, rays, patterns, picked, samples } = self;
         let pattern = patterns.get(&expectation.id).ok_or(Refusal::Unknown)?;
-        let view = View::new(camera, &expectation.ideal_from_cells)?;
+        let view = View::new(camera, expectation)?;
         let mut desk = Desk { camera, rays, picked, samples, image, pattern };
         let here = Cells::read(image, pattern, &view);
         if align::is_aligned(image, pattern, &view, &here)
@@ -271,7 +279,7 @@ fn corners(camera: &Camera, view: &View, fit: &Fit) -> Option<([Point2<f64>; 4],
         // d(u, v) / d(x, y), and d(u, v) / dG = (x, y, 1) for u and for v, −u (x, y) and −v (x, y) for the last two: a
         // change of G is made good by moving (x, y).
         let by_local = Matrix2::new(g[0] - u * g[6], g[1] - u * g[7], g[3] - v * g[6], g[4] - v * g[7]) / w;
-        let ideal = view.local.origin + Vector2::new(x, y) * view.local.unit;
+        let ideal = view.local.origin + view.bend.bent(Vector2::new(x, y)) * view.local.unit;
         let (pixel, by_ideal) = camera.pixel_of_ideal_with_jacobian(ideal);
         corners_px[k] = pixel;
         let by_cells = by_ideal * (-view.local.unit / w) * by_local.try_inverse()?;

@@ -3,6 +3,7 @@
 //! They lie where the grey level changes most: beside the edges, no farther than the blur reaches. As many are picked
 //! of each tag, evenly along all its edges, so that reading a tag takes about the same time whatever its size.
 
+use super::bend::Bend;
 use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
 use super::places::{self, Local, Places};
@@ -46,6 +47,8 @@ pub struct Scene<'a> {
     pub places: Places,
     /// Its local coordinates.
     pub local: Local,
+    /// What a rolling shutter makes of them.
+    pub bend: Bend,
     /// Rectangle of pixels that holds it: first and last.
     pub bounds_px: [[i32; 2]; 2],
     /// Length of the gradients of u and v in the image.
@@ -143,6 +146,7 @@ impl Kernel for Picking<'_> {
             }
             let [ray_x, ray_y] = rays.at(x, y);
             let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
+            let (x, y) = scene.bend.straightened(x, y);
             let (u, v) = places::mapped(&cells_from_local, x, y);
             let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
             pixels.weight = (V::new(pixels.weight) * inside).to_array();

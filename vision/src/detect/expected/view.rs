@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
-use super::Refusal;
+use super::bend::Bend;
 use super::pattern::{MIDDLE, Pattern};
 use super::places::{Local, Places};
 use super::sample::Scene;
+use super::{Expectation, Refusal};
 use crate::camera::Camera;
 use crate::image::GrayImage;
 
@@ -16,6 +17,7 @@ const LEAST_SIDE_PX: f64 = 12.0;
 #[derive(Debug, Clone, Copy)]
 pub struct View {
     pub local: Local,
+    pub bend: Bend,
     /// By rows; the last number is 1.
     pub cells_from_local: [f64; 9],
     pub local_from_cells: Matrix3<f64>,
@@ -35,7 +37,8 @@ pub struct View {
 const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
 
 impl View {
-    pub fn new(camera: &Camera, ideal_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+    pub fn new(camera: &Camera, expectation: &Expectation) -> Result<Self, Refusal> {
+        let ideal_from_cells = &expectation.ideal_from_cells;
         let ideal = |[u, v]: [f64; 2]| {
             let p = ideal_from_cells * Vector3::new(u, v, 1.0);
             (p.z > 0.0).then(|| Vector2::new(p.x / p.z, p.y / p.z))
@@ -46,11 +49,16 @@ impl View {
         let local = Local::new(camera, origin, unit);
         let (inv_unit, moved) = (1.0 / unit, -origin / unit);
         let local_from_ideal = Matrix3::new(inv_unit, 0.0, moved.x, 0.0, inv_unit, moved.y, 0.0, 0.0, 1.0);
-        Self::within(camera, &local, &(local_from_ideal * ideal_from_cells))
+        let bend = Bend::new(camera, &local, &expectation.ideal_rate);
+        Self::within(camera, (&local, bend), &(local_from_ideal * ideal_from_cells))
     }
 
     /// A tag in local coordinates that are already there.
-    fn within(camera: &Camera, local: &Local, local_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+    fn within(
+        camera: &Camera,
+        (local, bend): (&Local, Bend),
+        local_from_cells: &Matrix3<f64>,
+    ) -> Result<Self, Refusal> {
         let inverse = local_from_cells.try_inverse().ok_or(Refusal::Small)?;
         let scale = 1.0 / inverse[(2, 2)];
         let places = local.places(local_from_cells);
@@ -68,6 +76,7 @@ impl View {
         }
         Ok(Self {
             local: *local,
+            bend,
             cells_from_local: std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale),
             local_from_cells: *local_from_cells,
             places,
@@ -84,13 +93,13 @@ impl View {
     pub fn shifted(&self, camera: &Camera, shift_px: Vector2<f64>) -> Result<Self, Refusal> {
         let by_px = self.local.px_by_local.try_inverse().ok_or(Refusal::Small)?;
         let shift = Matrix3::new_translation(&(by_px * shift_px));
-        Self::within(camera, &self.local, &(shift * self.local_from_cells))
+        Self::within(camera, (&self.local, self.bend), &(shift * self.local_from_cells))
     }
 
     /// The tag as it was fitted in this view's local coordinates.
     pub fn fitted(&self, camera: &Camera, cells_from_local: &[f64; 9]) -> Result<Self, Refusal> {
         let inverse = Matrix3::from_row_slice(cells_from_local).try_inverse().ok_or(Refusal::Misfit)?;
-        Self::within(camera, &self.local, &inverse)
+        Self::within(camera, (&self.local, self.bend), &inverse)
     }
 
     /// What pixels are picked from.
@@ -107,6 +116,7 @@ impl View {
             pattern,
             places: self.places,
             local: self.local,
+            bend: self.bend,
             bounds_px: [low, high],
             cells_per_px: self.cells_per_px,
         }
