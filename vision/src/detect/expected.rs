@@ -28,11 +28,11 @@ use super::CornerCovariance;
 use crate::camera::Camera;
 use crate::image::GrayImage;
 use align::Cells;
-use fit::{Appearance, Closeness, Fit, Samples};
+use fit::{Appearance, Closeness, Fit, Samples, Smear};
 use pattern::{CORNERS, MIDDLE, Pattern};
 use rays::RayGrid;
-use sample::{Choice, Picked};
-use view::View;
+use sample::{Choice, Picked, Scene};
+use view::{View, Way};
 
 /// Where a tag is expected.
 #[derive(Debug, Clone, Copy)]
@@ -108,6 +108,13 @@ const FINELY: Closeness = Closeness { most_steps: 5, settled_px: 0.2 };
 /// Where motion smears the edges each pixel says less of them, and the kernel is another: more are taken, up to so many
 /// times, and from as far as the blur reaches.
 const MOST_TURNS: f64 = 4.0;
+
+/// Motions during the exposure that seem to be shorter are taken for more of the lens's blur, which costs less.
+const LEAST_SMEAR_PX: f64 = 1.8;
+/// The length of longer ones is looked at until it grows by no more than this,
+const SETTLED_SMEAR_PX: f64 = 0.3;
+/// or so many times.
+const SMEAR_ROUNDS: usize = 5;
 
 /// Reads expected tags in the images of one camera. One for each thread.
 #[derive(Debug)]
@@ -219,23 +226,64 @@ impl Desk<'_> {
             contrast: cells.contrast(),
             blur_cells: view.cells_per_px.map(|cells| START_BLUR_PX * cells),
             correlation: view.correlation,
+            smear: Smear::NONE,
         };
         let mut scene = view.scene(self.image, self.pattern);
         sample::pick(&scene, self.rays, &start, &COARSE, self.picked, self.samples);
-        let coarse = self.samples.fit(&start, &start, &COARSELY).ok_or(Refusal::Misfit)?.appearance;
+        let coarse =
+            self.samples.fit(self.pattern, &start, &start, &COARSELY).ok_or(Refusal::Misfit)?.appearance;
         let local_from_cells = Matrix3::from_row_slice(&coarse.cells_from_local).try_inverse();
         scene.places = view.local.places(&local_from_cells.ok_or(Refusal::Misfit)?);
-        let smeared = coarse.blur_over(&start).max(1.0);
+        let fit = match view.way {
+            Some(way) => self.fit_moving(&scene, &start, &coarse, &way)?,
+            None => self.fit_closely(&scene, &start, &coarse)?,
+        };
+        self.judge(view, &fit)
+    }
+
+    /// Fits a tag that may have moved far while it was exposed.
+    fn fit_moving(
+        &mut self,
+        scene: &Scene<'_>,
+        known: &Appearance,
+        coarse: &Appearance,
+        way: &Way,
+    ) -> Result<Fit, Refusal> {
+        let mut begin = *coarse;
+        let mut fitted = None;
+        // A bell is not what a motion leaves, and says less than its length: what is left over says more, each time.
+        for _ in 0..SMEAR_ROUNDS {
+            let length_px = begin.smear_px(known, way.cells_per_px);
+            if length_px < LEAST_SMEAR_PX || length_px - begin.smear.length_px < SETTLED_SMEAR_PX {
+                break;
+            }
+            let smear = Smear { local: way.local_per_px.map(|share| share * length_px), length_px };
+            let fit =
+                self.fit_closely(scene, known, &Appearance { smear, blur_cells: known.blur_cells, ..begin })?;
+            begin = fit.appearance;
+            fitted = Some(fit);
+        }
+        fitted.map_or_else(|| self.fit_closely(scene, known, coarse), Ok)
+    }
+
+    /// Fits with pixels close to the edges.
+    fn fit_closely(
+        &mut self,
+        scene: &Scene<'_>,
+        known: &Appearance,
+        begin: &Appearance,
+    ) -> Result<Fit, Refusal> {
+        let smeared = begin.blur_over(known).max(1.0);
+        let moved = begin.smear.length_px / (2.0 * START_BLUR_PX);
         let fine = Choice {
             blur_share: (FINE.blur_share * smeared * smeared).min(1.0),
-            turns: smeared.min(MOST_TURNS).round() as usize,
+            turns: (smeared + moved).min(MOST_TURNS).round() as usize,
             ..FINE
         };
-        sample::pick(&scene, self.rays, &coarse, &fine, self.picked, self.samples);
+        sample::pick(scene, self.rays, begin, &fine, self.picked, self.samples);
         // Where the kernel is another, steps promise more than they keep: the last must be short.
         let closely = Closeness { settled_px: FINELY.settled_px / (smeared * smeared), ..FINELY };
-        let fit = self.samples.fit(&coarse, &start, &closely).ok_or(Refusal::Misfit)?;
-        self.judge(view, &fit)
+        self.samples.fit(self.pattern, begin, known, &closely).ok_or(Refusal::Misfit)
     }
 
     /// Whether what was fitted is the tag, and where its corners are.

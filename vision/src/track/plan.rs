@@ -87,14 +87,10 @@ impl Exposed {
         const STEPS: usize = 2;
         let camera_from_world = camera.world_from_camera.inverse();
         let mut camera_from_shell = camera_from_world * motion.world_from_shell;
-        if camera.line_time_s == 0.0 {
-            let none = Vector3::zeros();
-            let sheared = Matrix3::identity();
-            return Self { camera_from_shell, sheared, velocity_m_s: none, rate_rad_s: none };
-        }
         let state = motion.state();
         let mut delay_s = 0.0;
-        for _ in 0..STEPS {
+        let steps = if camera.line_time_s == 0.0 { 0 } else { STEPS };
+        for _ in 0..steps {
             let Some(pixel) = camera.project(&(camera_from_shell * place)) else { break };
             delay_s = camera.row_delay_s(pixel.y);
             camera_from_shell = camera_from_world * state.pose_after(delay_s);

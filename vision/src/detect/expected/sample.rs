@@ -115,10 +115,12 @@ impl Kernel for Picking<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { scene, rays, appearance, choice, picked, samples } = self;
+        let moved = appearance.smear_cells().map(|cells| 0.5 * cells);
         let reach: [f32; 2] = std::array::from_fn(|axis| {
             let blur = choice.blur_share * appearance.blur_cells[axis];
-            (blur + choice.spare_px * scene.cells_per_px[axis]) as f32
+            (blur + choice.spare_px * scene.cells_per_px[axis] + moved[axis]) as f32
         });
+        let border = moved.map(|cells| BORDER + cells as f32);
         let (reach_u, reach_v) = (V::splat(reach[0]), V::splat(reach[1]));
         let cells_from_local = appearance.cells_from_local.map(|value| value as f32);
         let inv_unit = V::splat((1.0 / scene.local.unit) as f32);
@@ -148,7 +150,8 @@ impl Kernel for Picking<'_> {
             let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
             let (x, y) = scene.bend.straightened(x, y);
             let (u, v) = places::mapped(&cells_from_local, x, y);
-            let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
+            let between = |place: V, border: f32| place.is_between(border, CELLS as f32 - border);
+            let inside = between(u, border[0]) * between(v, border[1]);
             pixels.weight = (V::new(pixels.weight) * inside).to_array();
             let (column, row) = (u.bounded(BORDER, end).floor(), v.bounded(BORDER, end).floor());
             let cells = row.times_plus(V::splat(CELLS as f32), column).whole();
