@@ -12,6 +12,7 @@
 //! in [`fit`].
 
 mod align;
+mod bend;
 mod fit;
 mod pattern;
 mod places;
@@ -27,11 +28,11 @@ use super::CornerCovariance;
 use crate::camera::Camera;
 use crate::image::GrayImage;
 use align::Cells;
-use fit::{Appearance, Closeness, Fit, Samples};
+use fit::{Appearance, Closeness, Fit, Samples, Smear};
 use pattern::{CORNERS, MIDDLE, Pattern};
 use rays::RayGrid;
-use sample::{Choice, Picked};
-use view::View;
+use sample::{Choice, Picked, Scene};
+use view::{View, Way};
 
 /// Where a tag is expected.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +41,8 @@ pub struct Expectation {
     pub id: u32,
     /// Homography from cell coordinates (see [`Expectation::from_pose`]) to the ideal image (x/z, y/z).
     pub ideal_from_cells: Matrix3<f64>,
+    /// How it moves: what the ideal image shows at (x, y) moves as M (x, y, 1) does, a second later; zero at rest.
+    pub ideal_rate: Matrix3<f64>,
     /// How far off it may be, pixels.
     pub doubt_px: f64,
 }
@@ -106,6 +109,13 @@ const FINELY: Closeness = Closeness { most_steps: 5, settled_px: 0.2 };
 /// times, and from as far as the blur reaches.
 const MOST_TURNS: f64 = 4.0;
 
+/// Motions during the exposure that seem to be shorter are taken for more of the lens's blur, which costs less.
+const LEAST_SMEAR_PX: f64 = 1.8;
+/// The length of longer ones is looked at until it grows by no more than this,
+const SETTLED_SMEAR_PX: f64 = 0.3;
+/// or so many times.
+const SMEAR_ROUNDS: usize = 5;
+
 /// Reads expected tags in the images of one camera. One for each thread.
 #[derive(Debug)]
 pub struct Reader {
@@ -128,7 +138,12 @@ impl Expectation {
         let rotation = camera_from_tag.rotation.to_rotation_matrix();
         let (x, y) = (rotation.matrix().column(0) * cell_m, rotation.matrix().column(1) * -cell_m);
         let origin = camera_from_tag.translation.vector - (x + y) * MIDDLE;
-        Self { id, ideal_from_cells: Matrix3::from_columns(&[x, y, origin]), doubt_px }
+        Self {
+            id,
+            ideal_from_cells: Matrix3::from_columns(&[x, y, origin]),
+            ideal_rate: Matrix3::zeros(),
+            doubt_px,
+        }
     }
 
     /// Where a search has found a tag: its corners as this module reports them.
@@ -156,7 +171,7 @@ impl Expectation {
         }
         let h = matrix.lu().solve(&right)?;
         let ideal_from_cells = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
-        Some(Self { id, ideal_from_cells, doubt_px })
+        Some(Self { id, ideal_from_cells, ideal_rate: Matrix3::zeros(), doubt_px })
     }
 }
 
@@ -176,7 +191,7 @@ impl Reader {
     pub fn read(&mut self, image: &GrayImage, expectation: &Expectation) -> Result<Reading, Refusal> {
         let Self { camera, rays, patterns, picked, samples } = self;
         let pattern = patterns.get(&expectation.id).ok_or(Refusal::Unknown)?;
-        let view = View::new(camera, &expectation.ideal_from_cells)?;
+        let view = View::new(camera, expectation)?;
         let mut desk = Desk { camera, rays, picked, samples, image, pattern };
         let here = Cells::read(image, pattern, &view);
         if align::is_aligned(image, pattern, &view, &here)
@@ -211,23 +226,64 @@ impl Desk<'_> {
             contrast: cells.contrast(),
             blur_cells: view.cells_per_px.map(|cells| START_BLUR_PX * cells),
             correlation: view.correlation,
+            smear: Smear::NONE,
         };
         let mut scene = view.scene(self.image, self.pattern);
         sample::pick(&scene, self.rays, &start, &COARSE, self.picked, self.samples);
-        let coarse = self.samples.fit(&start, &start, &COARSELY).ok_or(Refusal::Misfit)?.appearance;
+        let coarse =
+            self.samples.fit(self.pattern, &start, &start, &COARSELY).ok_or(Refusal::Misfit)?.appearance;
         let local_from_cells = Matrix3::from_row_slice(&coarse.cells_from_local).try_inverse();
         scene.places = view.local.places(&local_from_cells.ok_or(Refusal::Misfit)?);
-        let smeared = coarse.blur_over(&start).max(1.0);
+        let fit = match view.way {
+            Some(way) => self.fit_moving(&scene, &start, &coarse, &way)?,
+            None => self.fit_closely(&scene, &start, &coarse)?,
+        };
+        self.judge(view, &fit)
+    }
+
+    /// Fits a tag that may have moved far while it was exposed.
+    fn fit_moving(
+        &mut self,
+        scene: &Scene<'_>,
+        known: &Appearance,
+        coarse: &Appearance,
+        way: &Way,
+    ) -> Result<Fit, Refusal> {
+        let mut begin = *coarse;
+        let mut fitted = None;
+        // A bell is not what a motion leaves, and says less than its length: what is left over says more, each time.
+        for _ in 0..SMEAR_ROUNDS {
+            let length_px = begin.smear_px(known, way.cells_per_px);
+            if length_px < LEAST_SMEAR_PX || length_px - begin.smear.length_px < SETTLED_SMEAR_PX {
+                break;
+            }
+            let smear = Smear { local: way.local_per_px.map(|share| share * length_px), length_px };
+            let fit =
+                self.fit_closely(scene, known, &Appearance { smear, blur_cells: known.blur_cells, ..begin })?;
+            begin = fit.appearance;
+            fitted = Some(fit);
+        }
+        fitted.map_or_else(|| self.fit_closely(scene, known, coarse), Ok)
+    }
+
+    /// Fits with pixels close to the edges.
+    fn fit_closely(
+        &mut self,
+        scene: &Scene<'_>,
+        known: &Appearance,
+        begin: &Appearance,
+    ) -> Result<Fit, Refusal> {
+        let smeared = begin.blur_over(known).max(1.0);
+        let moved = begin.smear.length_px / (2.0 * START_BLUR_PX);
         let fine = Choice {
             blur_share: (FINE.blur_share * smeared * smeared).min(1.0),
-            turns: smeared.min(MOST_TURNS).round() as usize,
+            turns: (smeared + moved).min(MOST_TURNS).round() as usize,
             ..FINE
         };
-        sample::pick(&scene, self.rays, &coarse, &fine, self.picked, self.samples);
+        sample::pick(scene, self.rays, begin, &fine, self.picked, self.samples);
         // Where the kernel is another, steps promise more than they keep: the last must be short.
         let closely = Closeness { settled_px: FINELY.settled_px / (smeared * smeared), ..FINELY };
-        let fit = self.samples.fit(&coarse, &start, &closely).ok_or(Refusal::Misfit)?;
-        self.judge(view, &fit)
+        self.samples.fit(self.pattern, begin, known, &closely).ok_or(Refusal::Misfit)
     }
 
     /// Whether what was fitted is the tag, and where its corners are.
@@ -271,7 +327,7 @@ fn corners(camera: &Camera, view: &View, fit: &Fit) -> Option<([Point2<f64>; 4],
         // d(u, v) / d(x, y), and d(u, v) / dG = (x, y, 1) for u and for v, −u (x, y) and −v (x, y) for the last two: a
         // change of G is made good by moving (x, y).
         let by_local = Matrix2::new(g[0] - u * g[6], g[1] - u * g[7], g[3] - v * g[6], g[4] - v * g[7]) / w;
-        let ideal = view.local.origin + Vector2::new(x, y) * view.local.unit;
+        let ideal = view.local.origin + view.bend.bent(Vector2::new(x, y)) * view.local.unit;
         let (pixel, by_ideal) = camera.pixel_of_ideal_with_jacobian(ideal);
         corners_px[k] = pixel;
         let by_cells = by_ideal * (-view.local.unit / w) * by_local.try_inverse()?;

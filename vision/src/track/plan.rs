@@ -37,7 +37,8 @@ pub(super) fn expected_tags(
     expected.clear();
     let doubt_px = doubt_px(camera, shell, motion, settings);
     for (index, tag) in shell.tags.iter().enumerate() {
-        let Exposed { camera_from_shell, sheared } = Exposed::of(camera, motion, &tag.center());
+        let exposed = Exposed::of(camera, motion, &tag.center());
+        let Exposed { camera_from_shell, sheared, .. } = exposed;
         let camera_from_tag = camera_from_shell * tag.shell_from_tag;
         let center = camera_from_tag.translation.vector;
         let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center.normalize());
@@ -54,7 +55,11 @@ pub(super) fn expected_tags(
         let ideal_from_cells = sheared * expectation.ideal_from_cells;
         expected.push(Expected {
             tag: index,
-            expectation: Expectation { ideal_from_cells, ..expectation },
+            expectation: Expectation {
+                ideal_from_cells,
+                ideal_rate: exposed.ideal_rate(&camera_from_tag),
+                ..expectation
+            },
             corners_px,
             area_px2: (c - a).perp(&(d - b)).abs(),
         });
@@ -71,6 +76,9 @@ struct Exposed {
     /// What the rows above and below it do to points about the place, in the camera frame: each is seen earlier or later,
     /// P' = P + v Δt, with Δt proportional to its distance from the row as that of the pinhole.
     sheared: Matrix3<f64>,
+    /// How the shell moves then, in the camera frame: its origin, m/s, and its turning, rad/s.
+    velocity_m_s: Vector3<f64>,
+    rate_rad_s: Vector3<f64>,
 }
 
 impl Exposed {
@@ -79,23 +87,34 @@ impl Exposed {
         const STEPS: usize = 2;
         let camera_from_world = camera.world_from_camera.inverse();
         let mut camera_from_shell = camera_from_world * motion.world_from_shell;
-        if camera.line_time_s == 0.0 {
-            return Self { camera_from_shell, sheared: Matrix3::identity() };
-        }
         let state = motion.state();
         let mut delay_s = 0.0;
-        for _ in 0..STEPS {
+        let steps = if camera.line_time_s == 0.0 { 0 } else { STEPS };
+        for _ in 0..steps {
             let Some(pixel) = camera.project(&(camera_from_shell * place)) else { break };
             delay_s = camera.row_delay_s(pixel.y);
             camera_from_shell = camera_from_world * state.pose_after(delay_s);
         }
         let in_camera = camera_from_shell * place;
-        let turning = camera_from_shell.rotation * state.rate_rad_s.cross(&place.coords);
         let moving = state.velocity_m_s + state.acceleration_m_s2 * delay_s;
-        let velocity = camera_from_world.rotation * moving + turning;
+        let velocity_m_s = camera_from_world.rotation * moving;
+        let turning = state.rate_rad_s + state.angular_rad_s2 * delay_s;
+        let rate_rad_s = camera_from_shell.rotation * turning;
+        let velocity = velocity_m_s + rate_rad_s.cross(&(camera_from_shell.rotation * place.coords));
         let rows_per_m = camera.focal_px.y / in_camera.z;
         let later = Vector3::new(0.0, 1.0, -in_camera.y / in_camera.z) * (camera.line_time_s * rows_per_m);
-        Self { camera_from_shell, sheared: Matrix3::identity() + velocity * later.transpose() }
+        let sheared = Matrix3::identity() + velocity * later.transpose();
+        Self { camera_from_shell, sheared, velocity_m_s, rate_rad_s }
+    }
+
+    /// [`Expectation::ideal_rate`] of a tag of the shell: a point P of it moves by Ω × P + (v − Ω × o) a second, where the
+    /// shell's origin o moves by v, and nᵀ P / d is 1 on the tag's plane.
+    fn ideal_rate(&self, camera_from_tag: &Isometry3<f64>) -> Matrix3<f64> {
+        let normal = camera_from_tag.rotation * Vector3::z();
+        let distance_m = normal.dot(&camera_from_tag.translation.vector);
+        let origin = self.camera_from_shell.translation.vector;
+        let moving = self.velocity_m_s - self.rate_rad_s.cross(&origin);
+        self.rate_rad_s.cross_matrix() + moving * (normal / distance_m).transpose()
     }
 }
 

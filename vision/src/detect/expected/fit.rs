@@ -15,6 +15,9 @@
 //! by Gauss-Newton, so that the edges are where they are whatever light and blur. Each edge is seen from both
 //! sides, so a wrong kernel of the right symmetry moves none.
 //!
+//! A tag that moves far while it is exposed is the mean of such pictures along its way ([`Smear`]), whose direction is that
+//! of the predicted motion; how long it is, the blur that was fitted without it says ([`Appearance::smear_px`]).
+//!
 //! The covariance of G is the inverse of the normal matrix times the variance of the residuals (Triggs et al.,
 //! "Bundle adjustment: a modern synthesis", 1999, section 2).
 
@@ -24,6 +27,7 @@ pub use lanes::Pixels;
 use lanes::{Derivatives, KERNEL_VARIANCE, Picture};
 
 use super::START_BLUR_PX;
+use super::pattern::Pattern;
 use crate::cholesky::{self, Cholesky};
 use crate::vector::{Kernel, Vector, fastest};
 
@@ -50,6 +54,27 @@ pub struct Appearance {
     pub blur_cells: [f64; 2],
     /// ρ: cosine of the angle between the gradients of u and v in the image; 0 for a tag seen from the front.
     pub correlation: f64,
+    /// How far the tag moves while it is exposed.
+    pub smear: Smear,
+}
+
+/// A steady straight motion during the exposure: the picture is the mean over its way. Known, not fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Smear {
+    /// From its begin to its end, local coordinates.
+    pub local: [f64; 2],
+    /// Its length in the image.
+    pub length_px: f64,
+}
+
+impl Smear {
+    /// A tag at rest.
+    pub const NONE: Self = Self { local: [0.0; 2], length_px: 0.0 };
+
+    /// Steps in which the way is reckoned with: a pixel each, less than two standard deviations of any lens.
+    fn steps(&self) -> usize {
+        self.length_px.ceil().max(1.0) as usize
+    }
 }
 
 /// Pixels of a tag near its edges.
@@ -114,13 +139,20 @@ impl Samples {
 
     /// Fits from a start that is right within half the reach of the blur; `None` where it leads nowhere. `known` has
     /// the blur that is believed beforehand.
-    pub fn fit(&mut self, start: &Appearance, known: &Appearance, closeness: &Closeness) -> Option<Fit> {
-        fastest(Fitting { samples: self, start, known, closeness })
+    pub fn fit(
+        &mut self,
+        pattern: &Pattern,
+        start: &Appearance,
+        known: &Appearance,
+        closeness: &Closeness,
+    ) -> Option<Fit> {
+        fastest(Fitting { samples: self, pattern, start, known, closeness })
     }
 
     #[inline(always)]
     fn fit_with<V: Vector>(
         &mut self,
+        pattern: &Pattern,
         start: &Appearance,
         known: &Appearance,
         closeness: &Closeness,
@@ -132,7 +164,7 @@ impl Samples {
         let mut appearance = *start;
         let cells_per_px = known.blur_cells[0].min(known.blur_cells[1]) / START_BLUR_PX;
         for _ in 0..closeness.most_steps {
-            let products = self.linearize::<V>(&appearance);
+            let products = self.linearize::<V>(pattern, &appearance);
             let squares = f64::from(products[UNKNOWNS][UNKNOWNS]);
             let noise = (squares / freedom).sqrt().max(LEAST_NOISE);
             let (normal, gradient) = normal_equations(&products, noise, &appearance, known);
@@ -153,7 +185,7 @@ impl Samples {
 
     /// Products of derivatives and residuals at an appearance, summed over the pixels.
     #[inline(always)]
-    fn linearize<V: Vector>(&mut self, appearance: &Appearance) -> lanes::Products {
+    fn linearize<V: Vector>(&mut self, pattern: &Pattern, appearance: &Appearance) -> lanes::Products {
         let [h_u, h_v] = appearance.blur_cells;
         let picture = Picture {
             cells_from_local: appearance.cells_from_local.map(|value| value as f32),
@@ -161,13 +193,16 @@ impl Samples {
             contrast: appearance.contrast as f32,
             inv_blur: [1.0 / h_u as f32, 1.0 / h_v as f32],
             mixed: (appearance.correlation * h_u * h_v * KERNEL_VARIANCE) as f32,
+            smear: appearance.smear.local.map(|value| value as f32),
+            steps: appearance.smear.steps(),
         };
-        lanes::products::<V>(&self.pixels, &picture, &mut self.derivatives)
+        lanes::products::<V>(&self.pixels, pattern, &picture, &mut self.derivatives)
     }
 }
 
 struct Fitting<'a> {
     samples: &'a mut Samples,
+    pattern: &'a Pattern,
     start: &'a Appearance,
     known: &'a Appearance,
     closeness: &'a Closeness,
@@ -178,7 +213,7 @@ impl Kernel for Fitting<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Option<Fit> {
-        self.samples.fit_with::<V>(self.start, self.known, self.closeness)
+        self.samples.fit_with::<V>(self.pattern, self.start, self.known, self.closeness)
     }
 }
 
@@ -215,6 +250,21 @@ impl Appearance {
         ratio(0).max(ratio(1))
     }
 
+    /// How far the tag moves while it is exposed, cells of u and of v.
+    pub fn smear_cells(&self) -> [f64; 2] {
+        let (g, [x, y]) = (&self.cells_from_local, self.smear.local);
+        [0, 3].map(|row| ((g[row] - g[row + 2] * g[6]) * x + (g[row + 1] - g[row + 2] * g[7]) * y).abs())
+    }
+
+    /// The length of the motion that explains what is more blurred than it should be: a box of length L has the variance
+    /// L²/12, of which each side of the tag sees the square of its share. `cells_per_px` are u and v along the motion.
+    pub fn smear_px(&self, known: &Self, cells_per_px: [f64; 2]) -> f64 {
+        let excess = |axis: usize| self.blur_cells[axis].powi(2) - known.blur_cells[axis].powi(2);
+        let variance = (excess(0) + excess(1)) * KERNEL_VARIANCE;
+        let seen = cells_per_px[0].powi(2) + cells_per_px[1].powi(2);
+        (self.smear.length_px.powi(2) + 12.0 * variance / seen).max(0.0).sqrt()
+    }
+
     /// With all unknowns changed; `None` if it is no picture of a tag any more.
     fn changed(&self, change: &Unknowns) -> Option<Self> {
         if !change.iter().all(|number| number.is_finite()) {
@@ -236,6 +286,7 @@ impl Appearance {
             contrast,
             blur_cells: [blur(0), blur(1)],
             correlation: self.correlation,
+            smear: self.smear,
         })
     }
 }

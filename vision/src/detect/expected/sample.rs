@@ -3,6 +3,7 @@
 //! They lie where the grey level changes most: beside the edges, no farther than the blur reaches. As many are picked
 //! of each tag, evenly along all its edges, so that reading a tag takes about the same time whatever its size.
 
+use super::bend::Bend;
 use super::fit::{Appearance, Pixels, Samples};
 use super::pattern::{CELLS, Pattern};
 use super::places::{self, Local, Places};
@@ -46,6 +47,8 @@ pub struct Scene<'a> {
     pub places: Places,
     /// Its local coordinates.
     pub local: Local,
+    /// What a rolling shutter makes of them.
+    pub bend: Bend,
     /// Rectangle of pixels that holds it: first and last.
     pub bounds_px: [[i32; 2]; 2],
     /// Length of the gradients of u and v in the image.
@@ -112,10 +115,12 @@ impl Kernel for Picking<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { scene, rays, appearance, choice, picked, samples } = self;
+        let moved = appearance.smear_cells().map(|cells| 0.5 * cells);
         let reach: [f32; 2] = std::array::from_fn(|axis| {
             let blur = choice.blur_share * appearance.blur_cells[axis];
-            (blur + choice.spare_px * scene.cells_per_px[axis]) as f32
+            (blur + choice.spare_px * scene.cells_per_px[axis] + moved[axis]) as f32
         });
+        let border = moved.map(|cells| BORDER + cells as f32);
         let (reach_u, reach_v) = (V::splat(reach[0]), V::splat(reach[1]));
         let cells_from_local = appearance.cells_from_local.map(|value| value as f32);
         let inv_unit = V::splat((1.0 / scene.local.unit) as f32);
@@ -143,8 +148,10 @@ impl Kernel for Picking<'_> {
             }
             let [ray_x, ray_y] = rays.at(x, y);
             let (x, y) = ((ray_x - origin_x) * inv_unit, (ray_y - origin_y) * inv_unit);
+            let (x, y) = scene.bend.straightened(x, y);
             let (u, v) = places::mapped(&cells_from_local, x, y);
-            let inside = u.is_between(BORDER, end) * v.is_between(BORDER, end);
+            let between = |place: V, border: f32| place.is_between(border, CELLS as f32 - border);
+            let inside = between(u, border[0]) * between(v, border[1]);
             pixels.weight = (V::new(pixels.weight) * inside).to_array();
             let (column, row) = (u.bounded(BORDER, end).floor(), v.bounded(BORDER, end).floor());
             let cells = row.times_plus(V::splat(CELLS as f32), column).whole();

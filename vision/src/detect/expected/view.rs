@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
-use super::Refusal;
+use super::bend::Bend;
 use super::pattern::{MIDDLE, Pattern};
 use super::places::{Local, Places};
 use super::sample::Scene;
+use super::{Expectation, Refusal};
 use crate::camera::Camera;
 use crate::image::GrayImage;
 
@@ -16,6 +17,9 @@ const LEAST_SIDE_PX: f64 = 12.0;
 #[derive(Debug, Clone, Copy)]
 pub struct View {
     pub local: Local,
+    pub bend: Bend,
+    /// The direction in which it moves, if it is known.
+    pub way: Option<Way>,
     /// By rows; the last number is 1.
     pub cells_from_local: [f64; 9],
     pub local_from_cells: Matrix3<f64>,
@@ -31,11 +35,44 @@ pub struct View {
     pub side_px: f64,
 }
 
+/// What does not change when the tag is found to lie a little elsewhere.
+struct Moving {
+    local: Local,
+    bend: Bend,
+    way: Option<Way>,
+}
+
+/// Where a tag is after it has moved by a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Way {
+    pub local_per_px: [f64; 2],
+    pub cells_per_px: [f64; 2],
+}
+
+impl Way {
+    /// Of slower motions the direction is not known well; no exposure makes a pixel of them.
+    const LEAST_PX_S: f64 = 50.0;
+
+    fn new(local: &Local, cells_from_local: &Matrix3<f64>, rate: &Matrix3<f64>) -> Option<Self> {
+        let middle = local.origin.push(1.0);
+        let moving = rate * middle;
+        let by_s = (moving.xy() - local.origin * moving.z) / local.unit;
+        let px_s = (local.px_by_local * by_s).norm();
+        let per_px = by_s / px_s;
+        // At the middle, where u and v are as their first derivatives say.
+        let h = cells_from_local / cells_from_local[(2, 2)];
+        let of =
+            |row: usize| (0..2).map(|k| (h[(row, k)] - h[(row, 2)] * h[(2, k)]) * per_px[k]).sum::<f64>();
+        (px_s > Self::LEAST_PX_S).then(|| Self { local_per_px: per_px.into(), cells_per_px: [of(0), of(1)] })
+    }
+}
+
 /// The outer corners of the white margin.
 const MARGIN: [[f64; 2]; 4] = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
 
 impl View {
-    pub fn new(camera: &Camera, ideal_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+    pub fn new(camera: &Camera, expectation: &Expectation) -> Result<Self, Refusal> {
+        let ideal_from_cells = &expectation.ideal_from_cells;
         let ideal = |[u, v]: [f64; 2]| {
             let p = ideal_from_cells * Vector3::new(u, v, 1.0);
             (p.z > 0.0).then(|| Vector2::new(p.x / p.z, p.y / p.z))
@@ -46,11 +83,19 @@ impl View {
         let local = Local::new(camera, origin, unit);
         let (inv_unit, moved) = (1.0 / unit, -origin / unit);
         let local_from_ideal = Matrix3::new(inv_unit, 0.0, moved.x, 0.0, inv_unit, moved.y, 0.0, 0.0, 1.0);
-        Self::within(camera, &local, &(local_from_ideal * ideal_from_cells))
+        let local_from_cells = local_from_ideal * ideal_from_cells;
+        let rate = &expectation.ideal_rate;
+        let way = local_from_cells.try_inverse().and_then(|inverse| Way::new(&local, &inverse, rate));
+        let moving = Moving { local, bend: Bend::new(camera, &local, rate), way };
+        Self::within(camera, &moving, &local_from_cells)
     }
 
     /// A tag in local coordinates that are already there.
-    fn within(camera: &Camera, local: &Local, local_from_cells: &Matrix3<f64>) -> Result<Self, Refusal> {
+    fn within(
+        camera: &Camera,
+        &Moving { local, bend, way }: &Moving,
+        local_from_cells: &Matrix3<f64>,
+    ) -> Result<Self, Refusal> {
         let inverse = local_from_cells.try_inverse().ok_or(Refusal::Small)?;
         let scale = 1.0 / inverse[(2, 2)];
         let places = local.places(local_from_cells);
@@ -67,7 +112,9 @@ impl View {
             return Err(Refusal::Small);
         }
         Ok(Self {
-            local: *local,
+            local,
+            bend,
+            way,
             cells_from_local: std::array::from_fn(|k| inverse[(k / 3, k % 3)] * scale),
             local_from_cells: *local_from_cells,
             places,
@@ -80,17 +127,21 @@ impl View {
         })
     }
 
+    fn moving(&self) -> Moving {
+        Moving { local: self.local, bend: self.bend, way: self.way }
+    }
+
     /// The same tag moved in the image.
     pub fn shifted(&self, camera: &Camera, shift_px: Vector2<f64>) -> Result<Self, Refusal> {
         let by_px = self.local.px_by_local.try_inverse().ok_or(Refusal::Small)?;
         let shift = Matrix3::new_translation(&(by_px * shift_px));
-        Self::within(camera, &self.local, &(shift * self.local_from_cells))
+        Self::within(camera, &self.moving(), &(shift * self.local_from_cells))
     }
 
     /// The tag as it was fitted in this view's local coordinates.
     pub fn fitted(&self, camera: &Camera, cells_from_local: &[f64; 9]) -> Result<Self, Refusal> {
         let inverse = Matrix3::from_row_slice(cells_from_local).try_inverse().ok_or(Refusal::Misfit)?;
-        Self::within(camera, &self.local, &inverse)
+        Self::within(camera, &self.moving(), &inverse)
     }
 
     /// What pixels are picked from.
@@ -107,6 +158,7 @@ impl View {
             pattern,
             places: self.places,
             local: self.local,
+            bend: self.bend,
             bounds_px: [low, high],
             cells_per_px: self.cells_per_px,
         }

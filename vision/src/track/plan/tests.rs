@@ -53,3 +53,33 @@ fn tags_of_a_hurried_hand_are_expected_where_the_rows_see_them() {
         "{compared} corners, up to {farthest_px} px from the capture time"
     );
 }
+
+#[test]
+fn the_rate_of_a_tag_is_that_of_differences() {
+    /// Of rates up to 1.5: what bends over a tenth of a millisecond, and what the middle row's time leaves.
+    const TOLERANCE: f64 = 2e-3;
+    const STEP_S: f64 = 1e-4;
+    let (motion, settings) = (hurried(), TrackerSettings::default());
+    let shells = testing::shells();
+    let camera = Camera { line_time_s: LINE_TIME_S, ..testing::rig().cameras[0].clone() };
+    let camera_from_world = camera.world_from_camera.inverse();
+    let mut expected = Vec::new();
+    expected_tags(&camera, &shells.shells[1], &motion, &settings, &mut expected);
+    assert!(!expected.is_empty());
+    for Expected { tag, expectation, .. } in &expected {
+        let tag = &shells.shells[1].tags[*tag];
+        let middle = seen(&camera, &motion, &tag.center());
+        let delay_s = camera.row_delay_s(middle.y);
+        for corner in tag.corners() {
+            let ideal = |later_s: f64| {
+                let p = camera_from_world * motion.state().pose_after(delay_s + later_s) * corner;
+                p.xy() / p.z
+            };
+            let difference = (ideal(STEP_S) - ideal(-STEP_S)) / (2.0 * STEP_S);
+            let here = ideal(0.0);
+            let rate = expectation.ideal_rate * here.coords.push(1.0);
+            let rate = rate.xy() - here.coords * rate.z;
+            assert!((rate - difference).norm() < TOLERANCE, "{rate} {difference}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Corners of single tags: our reader beside the library's, tag by tag in the same pictures.
 //!
 //! A tag of a given side, tilted about a random direction and turned at random, is printed on grey; blur 0.7 px, noise 2
-//! of a contrast of 160. The reader is told where the tag is to within a pixel, as tracking tells it; the library
+//! of a contrast of 160. The reader is told where the tag is to within a pixel and how fast it moves, as tracking tells it; the library
 //! (AprilTag with its edge refinement, every pixel) searches the picture. Errors are those per axis of the tags that both
 //! found, from where the corners truly are; the bound is the least that any unbiased estimate can have
 //! ([`super::bound`]).
@@ -97,6 +97,7 @@ fn one(camera: &Camera, case: &Case, number: u32, random: u64) -> anyhow::Result
     let about = truth_px.map(|corner| corner + off);
     let mut reader = Reader::new(camera, &[id]);
     let reading = Expectation::from_corners(id, camera, &about, 2.0)
+        .map(|still| Expectation { ideal_rate: print.ideal_rate(camera), ..still })
         .and_then(|expectation| reader.read(&image, &expectation).ok());
     let found = Detector::new(&[id])?.detect(&image, Search::Full { decimate: 1.0 });
     let found = found.first();

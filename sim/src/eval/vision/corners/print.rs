@@ -75,6 +75,16 @@ impl Print {
         })
     }
 
+    /// How the tag moves, if its way is that of an exposure of 10 ms: see [`Expectation::ideal_rate`].
+    ///
+    /// [`Expectation::ideal_rate`]: locoman_vision::detect::expected::Expectation::ideal_rate
+    pub fn ideal_rate(&self, camera: &Camera) -> Matrix3<f64> {
+        const EXPOSURE_S: f64 = 0.01;
+        let mut rate = Matrix3::zeros();
+        rate[(0, 2)] = self.motion_px / camera.focal_px.x / EXPOSURE_S;
+        rate
+    }
+
     /// The light on each pixel, by rows.
     pub fn light(&self, camera: &Camera) -> Vec<f32> {
         let (width, height) = (camera.width as usize * FINE, camera.height as usize * FINE);

@@ -1,6 +1,7 @@
 //! The fit's inner loops, eight pixels side by side.
 
 use super::UNKNOWNS;
+use crate::detect::expected::pattern::{CELLS, Pattern};
 use crate::detect::expected::places::plane;
 use crate::vector::{LANES, Vector};
 
@@ -52,51 +53,116 @@ pub struct Picture {
     /// Covariance of the blur along u and along v. A blur that is not aligned with the tag smooths its corners
     /// another way: to first order by this times the mixed derivative of T.
     pub mixed: f32,
+    /// How far the tag moves while it is exposed, local coordinates,
+    pub smear: [f32; 2],
+    /// and in how many equal steps this is reckoned with.
+    pub steps: usize,
 }
+
+/// Derivatives of the grey level by the unknowns, and the grey level itself.
+type Slopes<V> = [V; COUNT];
 
 /// Products of derivatives and residuals, summed over the pixels; `scratch` is kept for the next time.
 #[inline(always)]
-pub fn products<V: Vector>(pixels: &[Pixels], picture: &Picture, scratch: &mut Vec<Derivatives>) -> Products {
+pub fn products<V: Vector>(
+    pixels: &[Pixels],
+    pattern: &Pattern,
+    picture: &Picture,
+    scratch: &mut Vec<Derivatives>,
+) -> Products {
     scratch.resize(pixels.len(), [[0.0; LANES]; COUNT]);
-    derive::<V>(pixels, picture, scratch);
+    if picture.steps > 1 {
+        derive_smeared::<V>(pixels, pattern, picture, scratch);
+    } else {
+        derive::<V>(pixels, picture, scratch);
+    }
     sum_products::<V>(scratch)
 }
 
 /// Derivatives and residuals.
 #[inline(always)]
 fn derive<V: Vector>(pixels: &[Pixels], picture: &Picture, out: &mut [Derivatives]) {
-    let g = &picture.cells_from_local;
-    let (black, contrast, mixed) =
-        (V::splat(picture.black), V::splat(picture.contrast), V::splat(picture.mixed));
-    let (inv_blur_u, inv_blur_v) = (V::splat(picture.inv_blur[0]), V::splat(picture.inv_blur[1]));
     for (pixels, out) in pixels.iter().zip(out) {
         let (x, y) = (V::new(pixels.x), V::new(pixels.y));
-        let weight = V::new(pixels.weight);
-        let inv_w = V::splat(1.0) / plane(g[6], g[7], g[8], x, y);
-        let u = plane(g[0], g[1], g[2], x, y) * inv_w;
-        let v = plane(g[3], g[4], g[5], x, y) * inv_w;
-        let across = Weights::new(u - V::new(pixels.column), inv_blur_u);
-        let down = Weights::new(v - V::new(pixels.row), inv_blur_v);
-        let cells = Row::of_cells(&pixels.around);
-        let [t, t_u, t_v, t_hu, t_hv] = shade(&cells, &across, &down, mixed);
-        let scale = weight * contrast;
-        let (a, b) = (scale * t_u * inv_w, scale * t_v * inv_w);
-        let c = V::splat(0.0) - a.times_plus(u, b * v);
-        let residual = weight * (V::new(pixels.grey) - contrast.times_plus(t, black));
-        out[0] = weight.to_array();
-        out[1] = (weight * t).to_array();
-        out[2] = (scale * t_hu).to_array();
-        out[3] = (scale * t_hv).to_array();
-        out[4] = (a * x).to_array();
-        out[5] = (a * y).to_array();
-        out[6] = a.to_array();
-        out[7] = (b * x).to_array();
-        out[8] = (b * y).to_array();
-        out[9] = b.to_array();
-        out[10] = (c * x).to_array();
-        out[11] = (c * y).to_array();
-        out[12] = residual.to_array();
+        let [u, v, inv_w] = cells::<V>(picture, x, y);
+        let place = Place { x, y, u, v, inv_w, column: V::new(pixels.column), row: V::new(pixels.row) };
+        let slopes = slopes(picture, &place, &Row::of_cells(&pixels.around));
+        put(pixels, &slopes, V::splat(1.0), out);
     }
+}
+
+/// The same where the tag moves: the mean over its way. In steps of a pixel or less, which the lens smooths anyway, this is
+/// as good as the integral.
+#[inline(always)]
+fn derive_smeared<V: Vector>(
+    pixels: &[Pixels],
+    pattern: &Pattern,
+    picture: &Picture,
+    out: &mut [Derivatives],
+) {
+    let share = 1.0 / picture.steps as f32;
+    for (pixels, out) in pixels.iter().zip(out) {
+        let mut sums = [V::splat(0.0); COUNT];
+        for step in 0..picture.steps {
+            let along = (step as f32 + 0.5) * share - 0.5;
+            let x = V::new(pixels.x) + V::splat(along * picture.smear[0]);
+            let y = V::new(pixels.y) + V::splat(along * picture.smear[1]);
+            let [u, v, inv_w] = cells::<V>(picture, x, y);
+            let last = (CELLS - 1) as f32;
+            let (column, row) = (u.bounded(0.0, last).floor(), v.bounded(0.0, last).floor());
+            let cell = row.times_plus(V::splat(CELLS as f32), column).whole();
+            let around = cell.map(|cell| i32::from(pattern.around(cell as usize)));
+            let slopes = slopes(picture, &Place { x, y, u, v, inv_w, column, row }, &Row::of_cells(&around));
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                *sum = slope + *sum;
+            }
+        }
+        put(pixels, &sums, V::splat(share), out);
+    }
+}
+
+/// u, v and 1/w of local coordinates.
+#[inline(always)]
+fn cells<V: Vector>(picture: &Picture, x: V, y: V) -> [V; 3] {
+    let g = &picture.cells_from_local;
+    let inv_w = V::splat(1.0) / plane(g[6], g[7], g[8], x, y);
+    [plane(g[0], g[1], g[2], x, y) * inv_w, plane(g[3], g[4], g[5], x, y) * inv_w, inv_w]
+}
+
+/// Eight places on the tag, in local coordinates and in cells, and the cells that they are in.
+struct Place<V> {
+    x: V,
+    y: V,
+    u: V,
+    v: V,
+    inv_w: V,
+    column: V,
+    row: V,
+}
+
+/// The grey level and its derivatives at eight places.
+#[inline(always)]
+fn slopes<V: Vector>(picture: &Picture, place: &Place<V>, cells: &[Row<V>; 3]) -> Slopes<V> {
+    let &Place { x, y, u, v, inv_w, column, row } = place;
+    let across = Weights::new(u - column, V::splat(picture.inv_blur[0]));
+    let down = Weights::new(v - row, V::splat(picture.inv_blur[1]));
+    let [t, t_u, t_v, t_hu, t_hv] = shade(cells, &across, &down, V::splat(picture.mixed));
+    let contrast = V::splat(picture.contrast);
+    let (a, b) = (contrast * t_u * inv_w, contrast * t_v * inv_w);
+    let c = V::splat(0.0) - a.times_plus(u, b * v);
+    let grey = contrast.times_plus(t, V::splat(picture.black));
+    [V::splat(1.0), t, contrast * t_hu, contrast * t_hv, a * x, a * y, a, b * x, b * y, b, c * x, c * y, grey]
+}
+
+/// Puts down derivatives and residuals, the former times a share.
+#[inline(always)]
+fn put<V: Vector>(pixels: &Pixels, slopes: &Slopes<V>, share: V, out: &mut Derivatives) {
+    let weight = V::new(pixels.weight);
+    let scale = weight * share;
+    for (out, slope) in out.iter_mut().zip(&slopes[..UNKNOWNS]) {
+        *out = (scale * *slope).to_array();
+    }
+    out[UNKNOWNS] = (weight * V::new(pixels.grey) - scale * slopes[UNKNOWNS]).to_array();
 }
 
 /// Products summed over all pixels, four sums at a time: as many as hide how long an addition takes.
@@ -246,7 +312,6 @@ mod tests {
     use wide::f32x8;
 
     use super::*;
-    use crate::detect::expected::pattern::{CELLS, Pattern};
 
     /// Derivatives that a step of a thousandth of a cell cannot tell from differences.
     const TOLERANCE: f32 = 5e-3;
