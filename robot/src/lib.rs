@@ -11,6 +11,7 @@ pub mod commander;
 pub mod control;
 pub mod dynamics;
 pub mod estimator;
+pub mod go1;
 pub mod joints;
 pub mod kinematics;
 pub mod link;
