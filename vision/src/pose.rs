@@ -129,7 +129,8 @@ pub struct Solution {
 /// Limits of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
-    /// What calibration, print and lens leave in each corner: standard deviation per axis, pixels.
+    /// What calibration, print and lens leave in each corner at least: standard deviation per axis, pixels. What they leave
+    /// beyond it the residuals show ([`Views::variance`]); a larger floor made poses seem worse than they were.
     pub corner_floor_px: f64,
     /// χ² of a tag (eight residuals) up to which it counts in full. 20 is exceeded by chance once in a hundred.
     pub kernel_chi2: f64,
@@ -154,7 +155,7 @@ pub struct SolverSettings {
 impl Default for SolverSettings {
     fn default() -> Self {
         Self {
-            corner_floor_px: 0.04,
+            corner_floor_px: 0.01,
             kernel_chi2: 20.0,
             outlier_chi2: 60.0,
             outlier_floor_px: 0.6,

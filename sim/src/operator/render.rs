@@ -32,6 +32,8 @@ pub struct Exposure<'a> {
     pub width: usize,
     /// How often the samples of an edge are drawn anew; 1 leaves edges with some hundredths of their contrast as error.
     pub draws: u32,
+    /// Decides where samples lie.
+    pub seed: u64,
 }
 
 /// The light on each pixel, by rows.
@@ -257,7 +259,7 @@ fn sampled(
 ) -> f32 {
     // Each column and each row of the grid sees all times evenly: a magic-square-like order.
     const ORDER: [usize; GRID * GRID] = [0, 10, 5, 15, 12, 6, 9, 3, 7, 13, 2, 8, 11, 1, 14, 4];
-    let mut random = super::sensor::mix((row as u64) << 32 | column as u64);
+    let mut random = super::sensor::mix(exposure.seed ^ ((row as u64) << 32 | column as u64));
     let mut sum = 0.0;
     for _ in 0..exposure.draws {
         let turn = random as usize % SLICES;

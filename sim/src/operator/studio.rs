@@ -201,7 +201,7 @@ impl Studio {
     }
 
     /// The light that falls on a camera's pixels for a picture with this capture time. Edges are sampled in so many
-    /// draws, the same for each picture: where nothing moves their errors would not average out over pictures.
+    /// draws; where one exposure serves many pictures their errors do not average out.
     pub fn expose(&self, camera: usize, t_s: f64, draws: u32) -> Negative {
         let stand = &self.stands[camera];
         let place = stand.at(t_s);
@@ -219,6 +219,8 @@ impl Studio {
                     background: &place.background,
                     width: *width as usize,
                     draws: draws.max(1),
+                    // Others for each picture: what they miss of an edge must not look like a bias of what is measured.
+                    seed: mix(self.seed ^ mix(camera as u64 ^ t_s.to_bits())),
                 })
             }
         };
