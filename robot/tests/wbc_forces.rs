@@ -127,7 +127,7 @@ fn both_solvers_agree_on_100_000_recorded_problems() {
         let case = &cases[index as usize % cases.len()];
         let state = situations::state(&mut random, &nominal, &case.stance);
         dynamics.update(&nominal, &state);
-        let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
+        let objectives = situations::objectives(&mut random, &case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);
         // Torque limits rarely act: weaker motors, in two of five problems, show them acting.
         let strength = if random.share() < 0.6 { 1.0 } else { 0.005 + 0.6 * random.share().powi(2) };

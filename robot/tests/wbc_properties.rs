@@ -172,7 +172,7 @@ fn laws_hold_in(case: &Case, seed: u64) {
     for _ in 0..STATES {
         let state = situations::state(&mut random, &bench.model, &case.stance);
         dynamics.update(&bench.model, &state);
-        let objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
+        let objectives = situations::objectives(&mut random, &case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);
         let higher = (random.share() * objectives.len() as f64) as usize;
         let alone = bench.step(&state, &objectives[..higher], &contacts);
@@ -228,6 +228,11 @@ laws_hold! {
     laws_hold_on_the_left_gripper: 4;
     laws_hold_in_one_half_of_a_trot: 5;
     laws_hold_in_the_other_half_of_a_trot: 6;
+    laws_hold_walking_on_one_pair_of_feet: 7;
+    laws_hold_walking_on_the_other_pair_of_feet: 8;
+    laws_hold_walking_with_the_right_gripper: 9;
+    laws_hold_walking_with_the_left_gripper: 10;
+    laws_hold_walking_with_both_grippers: 11;
 }
 
 #[test]
@@ -338,7 +343,7 @@ fn the_command_is_continuous_where_a_target_is() {
     const WAYS: usize = 1000;
     /// Halvings of a way of 20 mm or 0.2 rad; what is left of it is nothing.
     const HALVINGS: usize = 30;
-    let cases = situations::cases();
+    let cases = situations::standing();
     let mut random = Random(11);
     let mut bench = Bench::new(WbcSettings::default());
     let mut dynamics = Dynamics::new();
@@ -347,7 +352,7 @@ fn the_command_is_continuous_where_a_target_is() {
         let case = &cases[way % cases.len()];
         let state = situations::state(&mut random, &bench.model, &case.stance);
         dynamics.update(&bench.model, &state);
-        let mut objectives = situations::objectives(&mut random, case.objectives, &state, &dynamics);
+        let mut objectives = situations::objectives(&mut random, &case.objectives, &state, &dynamics);
         let contacts = situations::contacts(&mut random, &case.stance);
         let index = (random.share() * objectives.len() as f64) as usize;
         let (target, direction) = (objectives[index], random.vector(0.02));

@@ -6,7 +6,10 @@ use locoman_robot::{
     dynamics::{Dynamics, State},
     joints::{JointVector, Leg, Side},
     model::{Frame, Model},
-    modes::table::{STANCE, TABLE},
+    modes::{
+        Arms, Mode,
+        table::{Row, STANCE, TABLE},
+    },
     wbc::{ContactSet, Objective, ObjectiveKind, PointReference, RotationReference},
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -19,27 +22,50 @@ pub fn model() -> Model {
 pub struct Case {
     pub name: String,
     pub stance: Vec<Leg>,
-    pub objectives: &'static [ObjectiveKind],
+    pub objectives: Vec<ObjectiveKind>,
 }
 
-/// The rows of the table of modes, and both pairs of feet of a trot with the objectives of a stance.
+const PAIRS: [[Leg; 2]; 2] = [[Leg::FrontRight, Leg::RearLeft], [Leg::FrontLeft, Leg::RearRight]];
+
+/// The rows of the table of modes that stand, and both pairs of feet of a trot with the objectives of a stance.
+pub fn standing() -> Vec<Case> {
+    let rows = TABLE.iter().filter(|row| !matches!(row.mode, Mode::Locomotion | Mode::LocoManipulation(_)));
+    let of = |name: String, stance: &[Leg], objectives: &[ObjectiveKind]| Case {
+        name,
+        stance: stance.to_vec(),
+        objectives: objectives.to_vec(),
+    };
+    let rows = rows.map(|row| of(format!("{:?}", row.mode), row.stance, row.objectives));
+    let trots = PAIRS.iter().map(|pair| of(format!("trot on {pair:?}"), pair, STANCE.objectives));
+    rows.chain(trots).collect()
+}
+
+/// Those, and the rows that walk on one pair of feet of a trot, locomotion on both.
 pub fn cases() -> Vec<Case> {
-    let mut cases: Vec<_> = TABLE
-        .iter()
-        .map(|row| Case {
-            name: format!("{:?}", row.mode),
-            stance: row.stance.to_vec(),
-            objectives: row.objectives,
-        })
-        .collect();
-    for stance in [[Leg::FrontRight, Leg::RearLeft], [Leg::FrontLeft, Leg::RearRight]] {
-        cases.push(Case {
-            name: format!("trot on {stance:?}"),
-            stance: stance.to_vec(),
-            objectives: STANCE.objectives,
-        });
+    let mut cases = standing();
+    for row in TABLE {
+        match row.mode {
+            Mode::Locomotion => cases.extend(PAIRS.map(|pair| trot(row, pair))),
+            Mode::LocoManipulation(arms) => {
+                // The leg that swings carries the arm that works.
+                let pair = if arms == Arms::One(Side::Left) { PAIRS[0] } else { PAIRS[1] };
+                cases.push(trot(row, pair));
+            }
+            _ => {}
+        }
     }
     cases
+}
+
+/// Of the feet those in the air are tracked.
+fn trot(row: &Row, stance: [Leg; 2]) -> Case {
+    let stands =
+        |kind: &&ObjectiveKind| matches!(kind, ObjectiveKind::FootPosition(leg) if stance.contains(leg));
+    Case {
+        name: format!("{:?} on {stance:?}", row.mode),
+        stance: stance.to_vec(),
+        objectives: row.objectives.iter().filter(|kind| !stands(kind)).copied().collect(),
+    }
 }
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
