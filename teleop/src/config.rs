@@ -313,7 +313,7 @@ mod tests {
         assert_eq!(config, Config::default());
         // Every key is there: without any of its lines the file would still equal the defaults.
         let keys = SHIPPED.lines().filter(|l| l.contains(" = ") && !l.starts_with('#')).count();
-        assert_eq!(keys, 34);
+        assert_eq!(keys, 36);
     }
 
     #[test]

@@ -137,6 +137,20 @@ impl DrivenBody {
         self.follow_free(dt_s, permitted);
     }
 
+    /// One control step along what is played, if anything is, or else as the operator moves.
+    pub fn advance_by(
+        &mut self,
+        played: Option<&PoseReference>,
+        now_ns: u64,
+        dt_s: f64,
+        permitted: impl FnMut(&Isometry3<f64>) -> Isometry3<f64>,
+    ) {
+        match played {
+            Some(displacement) => self.advance_along(displacement, dt_s, permitted),
+            None => self.advance(now_ns, dt_s, permitted),
+        }
+    }
+
     /// Where the limits leave the free motion alone, exactly along with it.
     fn follow_free(&mut self, dt_s: f64, mut permitted: impl FnMut(&Isometry3<f64>) -> Isometry3<f64>) {
         let stop = self.free.stopping_pose();

@@ -90,7 +90,7 @@ pub struct Compensation {
     friction: JointVector,
     /// Share of the load of each foot in the last step.
     share: [f64; 4],
-    /// Whether offsets grow.
+    /// Whether the legs' offsets grow.
     legs_learn: bool,
 }
 

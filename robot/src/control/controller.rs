@@ -301,7 +301,8 @@ impl Controller {
                 JointCommand { position, velocity, torque: self.output.torque * fading, kp, kd, opening }
             }
             _ => {
-                self.wbc.set_walking(phase.is_walking());
+                let walks = phase.is_walking();
+                self.wbc.set_walking(walks);
                 let setpoint = self.choreography.setpoint();
                 let objectives = setpoint.objectives();
                 self.wbc.step(
@@ -312,10 +313,8 @@ impl Controller {
                     &mut self.output,
                 );
                 let WbcOutput { position, velocity, torque, .. } = self.output;
-                let walks = phase.is_walking();
-                let walking = self.config.locomotion.gains;
                 let (kp, kd) = if walks {
-                    JointGains::vectors(walking.kp, walking.kd)
+                    JointGains::vectors(gains.walking_kp, gains.walking_kd)
                 } else {
                     JointGains::vectors(gains.balance_kp, gains.balance_kd)
                 };

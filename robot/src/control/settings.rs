@@ -65,6 +65,16 @@ pub enum ConfigError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A number that makes no sense.
+    #[error("{file}: `{key}` must be {expected}")]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// The key.
+        key: &'static str,
+        /// What it must be.
+        expected: &'static str,
+    },
     /// A file is not what it should be.
     #[error("{file}: {source}")]
     Parse {
@@ -79,11 +89,16 @@ impl RobotConfig {
     /// Reads the folder `robot` of a configuration folder (`configs`).
     pub fn load(configs: &Path) -> Result<Self, ConfigError> {
         let folder = configs.join("robot");
+        let file = folder.join("locomotion.toml");
+        let locomotion: LocomotionSettings = read(&file)?;
+        if let Some((key, expected)) = locomotion.flaw() {
+            return Err(ConfigError::Value { file, key, expected });
+        }
         Ok(Self {
             model: Model::load(&folder)?,
             wbc: WbcSettings::load(&folder.join("wbc.toml"))?,
             control: read(&folder.join("control.toml"))?,
-            locomotion: read(&folder.join("locomotion.toml"))?,
+            locomotion,
             limits: read(&folder.join("limits.toml"))?,
             thresholds: read(&folder.join("supervisor.toml"))?,
         })

@@ -71,6 +71,16 @@ impl MotorCommand {
         }
     }
 
+    /// Torque, N m.
+    pub fn torque_n_m(&self) -> f64 {
+        f64::from(self.tau) / 256.0
+    }
+
+    /// Position gain, N m/rad, and velocity gain, N m s/rad.
+    pub fn gains(&self) -> [f64; 2] {
+        [f64::from(self.kp) / 32.0, f64::from(self.kd) / 16.0]
+    }
+
     /// Resists motion by `kd` N m s/rad and does nothing else.
     pub fn damping(kd: f32) -> Self {
         Self { kd: (kd.clamp(0.0, 2047.0) * 16.0) as u16, dq_rad_s: 0.0, ..Self::IDLE }

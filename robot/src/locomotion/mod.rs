@@ -9,6 +9,7 @@
 
 mod course;
 mod gait;
+mod ground;
 mod placement;
 mod settings;
 mod swing;
@@ -16,10 +17,11 @@ mod walker;
 
 pub use course::{Course, Velocity};
 pub use gait::{Gait, LegPhase};
-pub use placement::{GroundPlane, Motion, landing};
+pub use ground::GroundPlane;
+pub use placement::{Motion, landing};
 pub use settings::{
     ContactEvents, CourseSettings, GaitSettings, HoldingSettings, LocomotionSettings, PlacementSettings,
-    SwingSettings, TrimSettings, WalkingGains,
+    SwingSettings, TrimSettings,
 };
 pub use swing::Swing;
 pub use walker::{Steps, Walker};

@@ -8,7 +8,7 @@
 //! step. The hip is the foot's place about the robot's centre of mass, not about its torso: with two feet on the ground the
 //! robot tips about the line between them, and should as much one way as the other.
 
-use nalgebra::{Rotation2, Vector2, Vector3};
+use nalgebra::{Rotation2, Vector2};
 
 use super::settings::PlacementSettings;
 use crate::joints::Leg;
@@ -62,39 +62,6 @@ fn place_of(leg: Leg, settings: &PlacementSettings) -> Vector2<f64> {
     }
 }
 
-/// Height of the ground at a place, by the plane that fits the feet's last places on the ground best.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroundPlane {
-    /// Last places of the feet's centres on the ground.
-    footholds: [Vector3<f64>; 4],
-}
-
-impl GroundPlane {
-    /// Through four feet.
-    pub const fn new(footholds: [Vector3<f64>; 4]) -> Self {
-        Self { footholds }
-    }
-
-    /// A foot stands somewhere.
-    pub fn stand(&mut self, leg: Leg, foot: Vector3<f64>) {
-        self.footholds[leg.index()] = foot;
-    }
-
-    /// Height of a foot's centre on the ground there.
-    pub fn height(&self, at: &Vector2<f64>) -> f64 {
-        let mean = self.footholds.iter().sum::<Vector3<f64>>() / 4.0;
-        let (mut moments, mut lean) = (nalgebra::Matrix2::from_diagonal_element(1e-3), Vector2::zeros());
-        for foothold in &self.footholds {
-            let from_mean = foothold - mean;
-            let seen = from_mean.xy();
-            moments += seen * seen.transpose();
-            lean += seen * from_mean.z;
-        }
-        let slope = moments.cholesky().map_or_else(Vector2::zeros, |factor| factor.solve(&lean));
-        mean.z + slope.dot(&(at - mean.xy()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -137,13 +104,5 @@ mod tests {
                 prop_assert!(outward * apart.y >= settings.apart_m - 1e-9);
             }
         }
-    }
-
-    #[test]
-    fn the_ground_is_the_plane_through_the_feet() {
-        let slope = |x: f64, y: f64| Vector3::new(x, y, 0.1 * x - 0.05 * y + 0.02);
-        let feet = [slope(0.2, -0.15), slope(0.2, 0.15), slope(-0.2, -0.15), slope(-0.2, 0.15)];
-        let height = GroundPlane::new(feet).height(&Vector2::new(0.3, 0.1));
-        assert!((height - 0.045).abs() < 2e-3, "{height}");
     }
 }

@@ -21,11 +21,51 @@ pub struct LocomotionSettings {
     pub holding: HoldingSettings,
     /// What is learned of the torso's lean.
     pub trim: TrimSettings,
-    /// Legs, N m/rad and N m s/rad.
-    pub gains: WalkingGains,
 }
 
 impl LocomotionSettings {
+    /// The first key whose number makes no sense, and what it must be.
+    pub fn flaw(&self) -> Option<(&'static str, &'static str)> {
+        let Self { gait, contact, placement, swing, course, holding, trim } = self;
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let not_negative = |value: f64| value >= 0.0 && value.is_finite();
+        let share = |value: f64| value > 0.0 && value < 1.0;
+        let both = |vector: &Vector2<f64>| vector.iter().all(|value| positive(*value));
+        let checks = [
+            ("gait.frequency_hz", positive(gait.frequency_hz), "above 0 Hz"),
+            ("gait.duty", share(gait.duty), "above 0, below 1"),
+            ("gait.offset", gait.offset.iter().all(|offset| (0.0..1.0).contains(offset)), "0 to below 1"),
+            ("gait.hurry_hz_s_m", not_negative(gait.hurry_hz_s_m), "at least 0"),
+            ("gait.fastest_hz", gait.fastest_hz >= gait.frequency_hz, "at least gait.frequency_hz"),
+            ("contact.touch_n", positive(contact.touch_n), "above 0 N"),
+            ("contact.earliest_touch", share(contact.earliest_touch), "above 0, below 1"),
+            ("contact.load_s", positive(contact.load_s), "above 0 s"),
+            ("contact.least_share", share(contact.least_share), "above 0, below 1"),
+            ("placement.stance_m", both(&placement.stance_m), "two numbers above 0 m"),
+            ("placement.velocity_gain_s", not_negative(placement.velocity_gain_s), "at least 0 s"),
+            ("placement.reach_m", both(&placement.reach_m), "two numbers above 0 m"),
+            ("placement.apart_m", not_negative(placement.apart_m), "at least 0 m"),
+            ("swing.height_m", positive(swing.height_m), "above 0 m"),
+            ("swing.torso_m", positive(swing.torso_m), "above 0 m"),
+            ("swing.landing_m_s", positive(swing.landing_m_s), "above 0 m/s"),
+            ("swing.search_m", not_negative(swing.search_m), "at least 0 m"),
+            ("course.speed_m_s", both(&course.speed_m_s), "two numbers above 0 m/s"),
+            ("course.turn_rad_s", positive(course.turn_rad_s), "above 0 rad/s"),
+            ("course.acceleration_m_s2", positive(course.acceleration_m_s2), "above 0 m/s2"),
+            ("course.turn_acceleration_rad_s2", positive(course.turn_acceleration_rad_s2), "above 0 rad/s2"),
+            ("course.leash_m", positive(course.leash_m), "above 0 m"),
+            ("course.leash_rad", positive(course.leash_rad), "above 0 rad"),
+            ("course.ground_s", positive(course.ground_s), "above 0 s"),
+            ("course.balance_m", positive(course.balance_m), "above 0 m"),
+            ("holding.frequency_hz", positive(holding.frequency_hz), "above 0 Hz"),
+            ("holding.height_m", positive(holding.height_m), "above 0 m"),
+            ("trim.rate", not_negative(trim.rate), "at least 0 1/s"),
+            ("trim.most_m", not_negative(trim.most_m), "at least 0 m"),
+            ("trim.most_rad", not_negative(trim.most_rad), "at least 0 rad"),
+        ];
+        checks.into_iter().find(|(_, sound, _)| !sound).map(|(key, _, expected)| (key, expected))
+    }
+
     /// The same while arms hold something.
     #[must_use]
     pub fn for_holding(&self) -> Self {
@@ -152,16 +192,6 @@ pub struct TrimSettings {
     pub most_rad: f64,
 }
 
-/// Joint gains of walking legs.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WalkingGains {
-    /// N m/rad.
-    pub kp: f64,
-    /// N m s/rad.
-    pub kd: f64,
-}
-
 impl Default for LocomotionSettings {
     fn default() -> Self {
         Self {
@@ -192,7 +222,6 @@ impl Default for LocomotionSettings {
             },
             holding: HoldingSettings { frequency_hz: 2.7, height_m: 0.02 },
             trim: TrimSettings { rate: 2.0, most_m: 0.03, most_rad: 0.15 },
-            gains: WalkingGains { kp: 60.0, kd: 2.0 },
         }
     }
 }

@@ -40,11 +40,6 @@ impl Swing {
         self.to = to;
     }
 
-    /// Where it is to land.
-    pub const fn target(&self) -> &Vector3<f64> {
-        &self.to
-    }
-
     /// Where the foot should be after a share of the swing; after its end it goes on down.
     pub fn sample(&self, progress: f64, settings: &SwingSettings) -> PointReference {
         let [x, dx, ddx] = minimum_jerk(progress);

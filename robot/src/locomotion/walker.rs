@@ -5,7 +5,8 @@ use nalgebra::{Isometry3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use super::{
     course::{Course, Velocity},
     gait::{Gait, LegPhase},
-    placement::{GroundPlane, Motion, landing},
+    ground::GroundPlane,
+    placement::{Motion, landing},
     settings::{LocomotionSettings, TrimSettings},
     swing::Swing,
 };
@@ -25,6 +26,8 @@ const RESTING_RAD_S: f64 = 0.02;
 const STEPS_AFTER: f64 = 1.2;
 /// The velocity of a robot that walks undisturbed is off its course by so much within a step, m/s.
 const STRIDE_M_S: f64 = 0.15;
+/// A robot lower than this has fallen, m.
+const LEAST_HEIGHT_M: f64 = 0.05;
 /// Time constant in which its sway is averaged out, s: a cycle.
 const SWAY_S: f64 = 0.5;
 /// Time constant with which the middle of the robot is found, s: longer than a step.
@@ -100,11 +103,6 @@ impl Walker {
         self.gait.is_halted()
     }
 
-    /// Where it should go.
-    pub const fn course(&self) -> &Course {
-        &self.course
-    }
-
     /// One step. `posture` is the torso's about its course: height above the ground, roll and pitch.
     pub fn step(&mut self, wanted: &Velocity, posture: &PoseReference, scene: &Scene<'_>) -> Steps {
         let torso = &scene.state.world_from_torso;
@@ -112,7 +110,7 @@ impl Walker {
         self.course.step(wanted, &here, facing(scene), &self.settings.course, scene.dt_s);
         self.middle += (middle(scene) - self.middle) * (scene.dt_s / MIDDLE_S).min(1.0);
         let before = self.gait;
-        let may_halt = self.may_halt(wanted, scene);
+        let may_halt = self.rests(wanted, scene);
         let motion = self.motion(scene);
         self.gait.hurry((motion.velocity - motion.wanted).norm() - STRIDE_M_S);
         self.gait.step(scene.dt_s, may_halt, &scene.foot_force);
@@ -139,15 +137,16 @@ impl Walker {
         torso
     }
 
-    /// Nobody asks for motion, the robot is at rest and balanced, and its feet are in their places.
-    fn may_halt(&mut self, wanted: &Velocity, scene: &Scene<'_>) -> bool {
+    /// Watches for how long nobody has asked for motion and the robot has been at rest and balanced; whether its feet have
+    /// had the time to come to their places.
+    fn rests(&mut self, wanted: &Velocity, scene: &Scene<'_>) -> bool {
         let limited = wanted.limited(&self.settings.course);
         let going =
             |velocity: &Velocity| velocity.linear.norm() > RESTING_M_S || velocity.turn.abs() > RESTING_RAD_S;
         // Within a step the robot sways from foot to foot; only what lasts longer keeps it stepping.
-        let off_balance = self.off_balance(scene);
+        let capture = self.capture_point(scene);
         let share = if self.is_halted() { 1.0 } else { (scene.dt_s / SWAY_S).min(1.0) };
-        self.off_balance += (off_balance - self.off_balance) * share;
+        self.off_balance += (capture - self.off_balance) * share;
         let off_balance = self.off_balance.norm() > self.settings.course.balance_m;
         if going(&limited) || going(&self.course.velocity) || off_balance {
             self.resting_s = 0.0;
@@ -157,26 +156,22 @@ impl Walker {
         self.resting_s * self.settings.gait.frequency_hz >= STEPS_AFTER
     }
 
-    /// How far the point where the robot could come to rest is from the middle of its feet.
-    fn off_balance(&self, scene: &Scene<'_>) -> Vector2<f64> {
+    /// From the middle of the feet to the point where the robot could come to rest.
+    fn capture_point(&self, scene: &Scene<'_>) -> Vector2<f64> {
         let feet = Leg::ALL.map(|leg| from_above(&scene.foot(leg)));
         let between = feet.iter().sum::<Vector2<f64>>() / 4.0;
-        let state = scene.state;
-        let velocity = state.world_from_torso * state.torso_twist.fixed_rows::<3>(0).into_owned();
-        let height = (scene.com.z - self.ground_m).max(0.05);
-        let capture = from_above(&scene.com) + from_above(&velocity) * (height / GRAVITY).sqrt();
+        let height = (scene.com.z - self.ground_m).max(LEAST_HEIGHT_M);
+        let capture = from_above(&scene.com) + velocity(scene) * (height / GRAVITY).sqrt();
         capture - between
     }
 
     fn motion(&self, scene: &Scene<'_>) -> Motion {
-        let state = scene.state;
         let heading = facing(scene);
-        let velocity = state.world_from_torso * state.torso_twist.fixed_rows::<3>(0).into_owned();
         let middle = Rotation2::new(heading) * self.middle;
         Motion {
-            position: from_above(&state.world_from_torso.translation.vector) + middle,
+            position: from_above(&scene.state.world_from_torso.translation.vector) + middle,
             heading,
-            velocity: from_above(&velocity),
+            velocity: velocity(scene),
             wanted: from_above(&self.course.linear_velocity()),
             turn: self.course.velocity.turn,
         }
@@ -211,6 +206,12 @@ impl Walker {
         torso.rotation.angular_acceleration += self.course.turn_acceleration() * Vector3::z();
         torso
     }
+}
+
+/// Velocity of the torso along the ground.
+fn velocity(scene: &Scene<'_>) -> Vector2<f64> {
+    let state = scene.state;
+    from_above(&(state.world_from_torso * state.torso_twist.fixed_rows::<3>(0).into_owned()))
 }
 
 fn facing(scene: &Scene<'_>) -> f64 {

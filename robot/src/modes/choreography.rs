@@ -183,10 +183,7 @@ impl Choreography {
             Phase::LiftFoot(effector) => self.begin_lift(effector, scene),
             Phase::SingleFoot(side) => self.driving.begin_foot(side, &mut self.setpoint, scene),
             Phase::SingleGripper(side) => self.driving.begin_gripper(side, &mut self.setpoint, scene),
-            Phase::Walk => {
-                self.hold_arms(scene);
-                self.driving.begin_walk(None, &self.setpoint, scene);
-            }
+            Phase::Walk => self.driving.begin_walk(None, &self.setpoint, scene),
             Phase::WalkHolding(arms) => self.driving.begin_walk(Some(arms), &self.setpoint, scene),
             Phase::Unfold(arms) => {
                 self.move_torso(&self.setpoint.torso.pose());
@@ -250,8 +247,7 @@ impl Choreography {
                 for leg in Leg::ALL {
                     self.setpoint.load(leg, 1.0, load_step);
                 }
-                let arms_over = self.arms.iter().all(|motion| elapsed_s >= motion.duration_s());
-                Progress::on_four_feet(self.torso.is_over(elapsed_s) && arms_over)
+                Progress::on_four_feet(self.torso.is_over(elapsed_s) && self.arms_rest(elapsed_s))
             }
             Phase::Stance => {
                 self.driving.step(operator, scene, &mut self.setpoint);
@@ -263,15 +259,14 @@ impl Choreography {
             }
             Phase::Unfold(_) => {
                 self.play(elapsed_s);
-                let arms_over = self.arms.iter().all(|motion| elapsed_s >= motion.duration_s());
-                Progress::on_four_feet(self.torso.is_over(elapsed_s) && arms_over)
+                Progress::on_four_feet(self.torso.is_over(elapsed_s) && self.arms_rest(elapsed_s))
             }
             Phase::Halt => {
                 self.driving.halt(scene, &mut self.setpoint);
                 for side in Side::ALL {
                     self.setpoint.hold_arm(side, self.arms[side.index()].sample(elapsed_s));
                 }
-                Progress::on_four_feet(self.driving.is_halted())
+                Progress::on_four_feet(self.driving.is_halted() && self.arms_rest(elapsed_s))
             }
             Phase::ShiftTorso(effector) => {
                 self.play(elapsed_s);
@@ -351,13 +346,8 @@ impl Choreography {
         self.torso = PoseMotion::new(start, goal, duration_s);
     }
 
-    /// Arms whose posture is not in force stay as they are asked to be.
-    fn hold_arms(&mut self, scene: &Scene<'_>) {
-        for side in Side::ALL {
-            let posture = PointReference::hold(scene.desired_arm(side));
-            let posture = self.setpoint.arm(side).copied().unwrap_or(posture);
-            self.setpoint.hold_arm(side, posture);
-        }
+    fn arms_rest(&self, elapsed_s: f64) -> bool {
+        self.arms.iter().all(|motion| elapsed_s >= motion.duration_s())
     }
 
     fn stow_arms(&mut self, scene: &Scene<'_>) {

@@ -6,6 +6,7 @@ use super::{
     mode::{Arms, Effector},
     scene::Scene,
     setpoint::Setpoint,
+    walking::Walking,
 };
 use crate::{
     collision::Ground,
@@ -15,10 +16,10 @@ use crate::{
     },
     joints::{JointVector, Side},
     kinematics::torso_from_frame,
-    locomotion::{LocomotionSettings, Velocity, Walker},
+    locomotion::{LocomotionSettings, Velocity},
     model::{FOOT_RADIUS_M, Frame},
     trajectory::{Player, Sample},
-    wbc::{PointReference, RotationReference},
+    wbc::RotationReference,
 };
 
 /// Cut-off of the low-pass filter of the centre of mass, rad/s. [E] 3 Hz: a limb at 0.5 m/s moves it by 0.06 m/s,
@@ -53,19 +54,16 @@ pub struct Driving {
     foot_reach: FootReach,
     /// What moves torso and end effector in place of the operator's displacements.
     player: Option<Player>,
-    walking: LocomotionSettings,
-    /// What walks, and with which arms.
-    walker: Option<(Walker, Option<Arms>)>,
-    velocity: Velocity,
-    /// Grippers right, left that are turned while the robot walks.
-    held: [DrivenBody; 2],
+    locomotion: LocomotionSettings,
+    /// While the robot walks; the torso then is its posture about the course.
+    walking: Option<Walking>,
     opening: [f64; 2],
     opening_goal: [f64; 2],
 }
 
 impl Driving {
     /// At rest.
-    pub fn new(limits: Limits, walking: LocomotionSettings, posture: &JointVector) -> Self {
+    pub fn new(limits: Limits, locomotion: LocomotionSettings, posture: &JointVector) -> Self {
         let still = PoseReference::hold(&Isometry3::identity());
         Self {
             torso: DrivenBody::new(still, limits.follower_rad_s, limits.stance_torso_rate),
@@ -77,10 +75,8 @@ impl Driving {
             gripper_reach: Reach::new(Side::Right, posture, limits.reach),
             foot_reach: FootReach::new(Side::Right.leg(), posture, limits.reach),
             player: None,
-            walking,
-            walker: None,
-            velocity: Velocity::default(),
-            held: [DrivenBody::new(still, limits.follower_rad_s, limits.gripper_rate); 2],
+            locomotion,
+            walking: None,
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             limits,
@@ -101,31 +97,19 @@ impl Driving {
     /// Takes over a robot that stands, to walk.
     pub fn begin_walk(&mut self, arms: Option<Arms>, setpoint: &Setpoint, scene: &Scene<'_>) {
         self.effector = None;
-        let walking = if arms.is_some() { self.walking.for_holding() } else { self.walking };
-        let walker = Walker::new(walking, scene);
-        let posture = walker.posture_of(&setpoint.torso);
+        let walking = Walking::begin(&self.locomotion, &self.limits, arms, setpoint, scene);
+        let posture = walking.posture_of(&setpoint.torso);
         self.torso = DrivenBody::new(posture, self.limits.follower_rad_s, self.limits.stance_torso_rate);
-        self.walker = Some((walker, arms));
-        self.velocity = Velocity::default();
-        for side in Side::ALL {
-            let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
-            let gripper = turned((setpoint.torso.pose() * torso_from_gripper).rotation);
-            self.held[side.index()] = DrivenBody::new(
-                PoseReference::hold(&gripper),
-                self.limits.follower_rad_s,
-                self.limits.gripper_rate,
-            );
-        }
+        self.walking = Some(walking);
     }
 
     /// Whether a robot that walked stands on four feet again.
     pub fn is_halted(&self) -> bool {
-        self.walker.as_ref().is_none_or(|(walker, _)| walker.is_halted())
+        self.walking.as_ref().is_none_or(Walking::is_halted)
     }
 
     /// One step of a robot that comes to a halt.
     pub fn halt(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
-        self.velocity = Velocity::default();
         self.release();
         self.walk(None, scene, setpoint);
     }
@@ -159,7 +143,7 @@ impl Driving {
     }
 
     fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits, scene: &Scene<'_>) {
-        self.walker = None;
+        self.walking = None;
         self.torso_reach = TorsoReach::new(&setpoint.torso.pose(), scene.desired);
         self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
         self.com_from_torso = None;
@@ -169,7 +153,7 @@ impl Driving {
     pub fn step(&mut self, operator: &Operator<'_>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         self.listen(operator, scene);
         let played = self.player.as_ref().map(Player::sample);
-        if self.walker.is_some() {
+        if self.walking.is_some() {
             return self.walk(played.as_ref(), scene, setpoint);
         }
         self.move_torso(played.as_ref(), scene, setpoint);
@@ -190,10 +174,12 @@ impl Driving {
 
     fn listen(&mut self, operator: &Operator<'_>, scene: &Scene<'_>) {
         let Some((command, grip)) = operator.command else { return self.release() };
-        self.velocity = match grip {
-            Grip::Begins | Grip::Holds => self.limits.walking.velocity(command),
-            Grip::Frozen | Grip::Released | Grip::Resumes => Velocity::default(),
-        };
+        if let Some(walking) = &mut self.walking {
+            walking.head(match grip {
+                Grip::Begins | Grip::Holds => self.limits.walking.velocity(command),
+                Grip::Frozen | Grip::Released | Grip::Resumes => Velocity::default(),
+            });
+        }
         self.gripper_reach.pause(grip == Grip::Frozen);
         if let Some(player) = &mut self.player {
             player.advance(grip == Grip::Holds, scene.dt_s);
@@ -204,7 +190,7 @@ impl Driving {
             Grip::Begins => {
                 self.torso.engage();
                 self.limb.engage();
-                self.held.iter_mut().for_each(DrivenBody::engage);
+                self.walking.iter_mut().for_each(Walking::engage);
                 self.player = command.trajectory.as_ref().map(Player::new);
             }
             Grip::Resumes => self.release(),
@@ -216,13 +202,9 @@ impl Driving {
             return;
         }
         self.torso.displace(command.torso.as_ref(), operator.clock, scene.now_ns);
-        if self.walker.is_some() {
-            for side in Side::ALL {
-                let turn = command.palms[side.index()].map(|palm| turned(palm.rotation));
-                self.held[side.index()].displace(turn.as_ref(), operator.clock, scene.now_ns);
-                let opening = command.opening[side.index()];
-                self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
-            }
+        if let Some(walking) = &mut self.walking {
+            walking.displace(command, operator.clock, scene.now_ns);
+            self.open(&Side::ALL, &command.opening);
         }
         match self.effector {
             None => {}
@@ -231,17 +213,23 @@ impl Driving {
                 self.limb.displace(palm.as_ref(), operator.clock, scene.now_ns);
             }
             Some(Effector::Gripper(side)) => {
-                let (palm, opening) = (command.palms[side.index()], command.opening[side.index()]);
-                self.limb.displace(palm.as_ref(), operator.clock, scene.now_ns);
-                self.opening_goal[side.index()] = opening.unwrap_or(self.opening_goal[side.index()]);
+                self.limb.displace(command.palms[side.index()].as_ref(), operator.clock, scene.now_ns);
+                self.open(&[side], &command.opening);
             }
+        }
+    }
+
+    /// What is asked of the jaws of these sides.
+    fn open(&mut self, sides: &[Side], opening: &[Option<f64>; 2]) {
+        for place in sides.iter().map(|side| side.index()) {
+            self.opening_goal[place] = opening[place].unwrap_or(self.opening_goal[place]);
         }
     }
 
     fn release(&mut self) {
         self.torso.release();
         self.limb.release();
-        self.held.iter_mut().for_each(DrivenBody::release);
+        self.walking.iter_mut().for_each(Walking::release);
         self.gripper_reach.stay();
         self.player = None;
     }
@@ -267,38 +255,21 @@ impl Driving {
         let reach = &mut self.torso_reach;
         let permitted =
             |wanted: &Isometry3<f64>| reach.nearest(scene.model, &footing, &range.clamp(wanted), scene.dt_s);
-        match played {
-            Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
-            None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
-        }
+        let along = played.map(|sample| &sample.torso);
+        self.torso.advance_by(along, scene.now_ns, scene.dt_s, permitted);
         setpoint.torso = *self.torso.reference();
     }
 
-    /// The torso along its course, at the height and tilt that are asked for; the feet under it; grippers as they are
-    /// turned.
+    /// The torso along its course, at the height and tilt that are asked for.
     fn walk(&mut self, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
-        let Some((walker, arms)) = &mut self.walker else { return };
         let range = self.limits.walking.torso;
-        let permitted = |wanted: &Isometry3<f64>| range.clamp(wanted);
-        match played {
-            Some(sample) => self.torso.advance_along(&sample.torso, scene.dt_s, permitted),
-            None => self.torso.advance(scene.now_ns, scene.dt_s, permitted),
+        let along = played.map(|sample| &sample.torso);
+        self.torso.advance_by(along, scene.now_ns, scene.dt_s, |wanted| range.clamp(wanted));
+        if let Some(sample) = played {
+            self.open(&Side::ALL, &sample.opening);
         }
-        let steps = walker.step(&self.velocity, self.torso.reference(), scene);
-        setpoint.walk(&steps, *arms);
-        for side in Side::ALL {
-            let gripper = &mut self.held[side.index()];
-            match played {
-                Some(sample) => {
-                    let place = side.index();
-                    self.opening_goal[place] = sample.opening[place].unwrap_or(self.opening_goal[place]);
-                    let mut turn = sample.limbs[place];
-                    turn.point = PointReference::hold(Vector3::zeros());
-                    gripper.advance_along(&turn, scene.dt_s, |wanted| *wanted);
-                }
-                None => gripper.advance(scene.now_ns, scene.dt_s, |wanted| *wanted),
-            }
-            setpoint.turn_gripper(side, gripper.reference().rotation);
+        if let Some(walking) = &mut self.walking {
+            walking.step(self.torso.reference(), played, scene, setpoint);
         }
     }
 
@@ -314,14 +285,11 @@ impl Driving {
             let nearest = world_from_torso * reach.nearest(scene.model, &inside);
             Isometry3::from_parts(nearest.into(), wanted.rotation)
         };
-        match played {
-            Some(sample) => {
-                let mut foot = sample.limbs[side.index()];
-                foot.rotation = RotationReference::hold(UnitQuaternion::identity());
-                self.limb.advance_along(&foot, scene.dt_s, permitted);
-            }
-            None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
-        }
+        let along = played.map(|sample| PoseReference {
+            rotation: RotationReference::hold(UnitQuaternion::identity()),
+            ..sample.limbs[side.index()]
+        });
+        self.limb.advance_by(along.as_ref(), scene.now_ns, scene.dt_s, permitted);
         setpoint.lift(side, self.limb.reference().point);
     }
 
@@ -343,13 +311,10 @@ impl Driving {
             let target = world_from_torso.inv_mul(&inside);
             world_from_torso * reach.nearest(scene.model, scene.desired, &ground, &target, scene.dt_s)
         };
-        match played {
-            Some(sample) => {
-                let place = side.index();
-                self.opening_goal[place] = sample.opening[place].unwrap_or(self.opening_goal[place]);
-                self.limb.advance_along(&sample.limbs[place], scene.dt_s, permitted);
-            }
-            None => self.limb.advance(scene.now_ns, scene.dt_s, permitted),
+        let along = played.map(|sample| &sample.limbs[side.index()]);
+        self.limb.advance_by(along, scene.now_ns, scene.dt_s, permitted);
+        if let Some(sample) = played {
+            self.open(&[side], &sample.opening);
         }
         match self.gripper_reach.detour(scene.model) {
             None => setpoint.grasp(side, *self.limb.reference()),
@@ -360,9 +325,4 @@ impl Driving {
             }
         }
     }
-}
-
-/// A rotation as the pose of a body that is only turned.
-fn turned(rotation: UnitQuaternion<f64>) -> Isometry3<f64> {
-    Isometry3::from_parts(Vector3::zeros().into(), rotation)
 }

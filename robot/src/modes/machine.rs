@@ -189,7 +189,8 @@ impl Machine {
             }
             Phase::Walk if self.goal != Mode::Locomotion => Phase::Halt,
             Phase::WalkHolding(arms) if walking != Some(arms) => Phase::Halt,
-            Phase::Halt if self.goal == Mode::Locomotion => {
+            // Not before it stands: a gait begins on four feet.
+            Phase::Halt if inputs.arrived && self.goal == Mode::Locomotion => {
                 self.mode = self.goal;
                 Phase::Walk
             }

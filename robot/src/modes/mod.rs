@@ -25,6 +25,7 @@ mod settings;
 mod shift;
 pub mod table;
 mod touch_down;
+mod walking;
 
 pub use choreography::{Choreography, Progress};
 pub use driving::{Driving, Operator};

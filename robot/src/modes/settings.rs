@@ -171,6 +171,10 @@ pub struct JointGains {
     pub balance_kp: f64,
     /// N m s/rad.
     pub balance_kd: f64,
+    /// Legs of a robot that walks, N m/rad.
+    pub walking_kp: f64,
+    /// N m s/rad.
+    pub walking_kd: f64,
     /// Legs that follow plain joint set-points, N m/rad.
     pub scripted_kp: f64,
     /// N m s/rad.
@@ -179,7 +183,14 @@ pub struct JointGains {
 
 impl Default for JointGains {
     fn default() -> Self {
-        Self { balance_kp: 60.0, balance_kd: 2.0, scripted_kp: 200.0, scripted_kd: 2.0 }
+        Self {
+            balance_kp: 60.0,
+            balance_kd: 2.0,
+            walking_kp: 60.0,
+            walking_kd: 2.0,
+            scripted_kp: 200.0,
+            scripted_kd: 2.0,
+        }
     }
 }
 

@@ -104,16 +104,7 @@ pub static SINGLE_GRIPPER: [Row; 2] = [
 /// Locomotion. Which feet stand changes all the time; those that do not are tracked.
 pub static LOCOMOTION: Row = Row {
     mode: Mode::Locomotion,
-    objectives: &[
-        TorsoPosition,
-        TorsoOrientation,
-        FootPosition(Leg::FrontRight),
-        FootPosition(Leg::FrontLeft),
-        FootPosition(Leg::RearRight),
-        FootPosition(Leg::RearLeft),
-        ArmPosture(Side::Right),
-        ArmPosture(Side::Left),
-    ],
+    objectives: &walking(ArmPosture(Side::Right), ArmPosture(Side::Left)),
     stance: &Leg::ALL,
 };
 
@@ -121,47 +112,34 @@ pub static LOCOMOTION: Row = Row {
 pub static LOCO_MANIPULATION: [Row; 3] = [
     Row {
         mode: Mode::LocoManipulation(Arms::One(Side::Right)),
-        objectives: &[
-            TorsoPosition,
-            TorsoOrientation,
-            FootPosition(Leg::FrontRight),
-            FootPosition(Leg::FrontLeft),
-            FootPosition(Leg::RearRight),
-            FootPosition(Leg::RearLeft),
-            GripperOrientation(Side::Right),
-            ArmPosture(Side::Left),
-        ],
+        objectives: &walking(GripperOrientation(Side::Right), ArmPosture(Side::Left)),
         stance: &Leg::ALL,
     },
     Row {
         mode: Mode::LocoManipulation(Arms::One(Side::Left)),
-        objectives: &[
-            TorsoPosition,
-            TorsoOrientation,
-            FootPosition(Leg::FrontRight),
-            FootPosition(Leg::FrontLeft),
-            FootPosition(Leg::RearRight),
-            FootPosition(Leg::RearLeft),
-            GripperOrientation(Side::Left),
-            ArmPosture(Side::Right),
-        ],
+        objectives: &walking(GripperOrientation(Side::Left), ArmPosture(Side::Right)),
         stance: &Leg::ALL,
     },
     Row {
         mode: Mode::LocoManipulation(Arms::Both),
-        objectives: &[
-            TorsoPosition,
-            TorsoOrientation,
-            FootPosition(Leg::FrontRight),
-            FootPosition(Leg::FrontLeft),
-            FootPosition(Leg::RearRight),
-            FootPosition(Leg::RearLeft),
-            GripperOrientation(Side::Right),
-            GripperOrientation(Side::Left),
-        ],
+        objectives: &walking(GripperOrientation(Side::Right), GripperOrientation(Side::Left)),
         stance: &Leg::ALL,
     },
 ];
+
+/// Torso, feet, and then the arms.
+const fn walking(first: ObjectiveKind, second: ObjectiveKind) -> [ObjectiveKind; MAX_OBJECTIVES] {
+    [
+        TorsoPosition,
+        TorsoOrientation,
+        FootPosition(Leg::FrontRight),
+        FootPosition(Leg::FrontLeft),
+        FootPosition(Leg::RearRight),
+        FootPosition(Leg::RearLeft),
+        first,
+        second,
+    ]
+}
 
 /// The row of loco-manipulation with these arms.
 pub fn loco_manipulation(arms: Arms) -> &'static Row {

@@ -41,9 +41,8 @@ pub struct Tracked {
 
 /// The controller: its settings and the memory that it works in.
 pub struct WholeBodyController {
-    /// Those in force: of a robot that stands, or walks.
     settings: WbcSettings,
-    standing: WbcSettings,
+    walks: bool,
     dynamics: Dynamics,
     tracking: Tracking,
     stops: Stops,
@@ -59,7 +58,7 @@ impl WholeBodyController {
     pub fn new(settings: WbcSettings) -> Self {
         Self {
             settings,
-            standing: settings,
+            walks: false,
             dynamics: Dynamics::new(),
             tracking: Tracking::new(),
             stops: Stops::new(),
@@ -80,9 +79,8 @@ impl WholeBodyController {
     }
 
     /// The robot walks from now on, or stands.
-    pub fn set_walking(&mut self, walks: bool) {
-        self.settings = if walks { self.standing.for_walking() } else { self.standing };
-        self.forces.set_slack_weight(self.settings.contact.slack_weight);
+    pub const fn set_walking(&mut self, walks: bool) {
+        self.walks = walks;
     }
 
     /// Kinematics and dynamics at the state of the last step.
@@ -182,7 +180,7 @@ impl WholeBodyController {
         }
         let contact_levels = self.tracking.levels();
         for objective in objectives {
-            let gains = self.settings.objectives.of(objective.kind());
+            let gains = self.settings.gains(objective.kind(), self.walks);
             match objective.task(&Robot { state, dynamics }, gains) {
                 Some(task) => self.tracking.add(task, gains.damping_start),
                 None => status.fault = Some(WbcFault::Reference),

@@ -55,11 +55,6 @@ impl ForceDistribution {
         }
     }
 
-    /// Q_2 from now on.
-    pub(super) const fn set_slack_weight(&mut self, weight: [f64; 6]) {
-        self.settings.slack_weight = weight;
-    }
-
     /// Leaves every step to the interior-point method, for measurements.
     pub(super) const fn use_second_only(&mut self) {
         self.second_only = true;

@@ -89,8 +89,8 @@ pub struct WalkingSettings {
     pub torso_position: Gains,
     /// Torso orientation.
     pub torso_orientation: Gains,
-    /// Q_2
-    pub slack_weight: [f64; 6],
+    /// Feet in the air.
+    pub foot_position: Gains,
 }
 
 /// How joints, limbs and links come to a stop.
@@ -187,12 +187,11 @@ impl Default for WbcSettings {
             damping_start,
             step_share: 1.0,
         };
-        let axes = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
         Self {
             objectives: ObjectiveGains {
                 torso_position: gains(100.0, 10.0, 0.05, 10.0, 0.05),
                 torso_orientation: gains(100.0, 10.0, 0.3, 10.0, 0.05),
-                foot_position: gains(100.0, 10.0, 0.05, 100.0, 0.02),
+                foot_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_orientation: gains(100.0, 10.0, 0.3, 30.0, 0.05),
                 arm_posture: gains(100.0, 10.0, 0.3, 30.0, 0.05),
@@ -207,17 +206,17 @@ impl Default for WbcSettings {
             },
             walking: WalkingSettings {
                 torso_position: Gains {
-                    kd: axes(20.0, 20.0, 10.0),
+                    kd: Vector3::new(20.0, 20.0, 10.0),
                     step_share: 0.5,
                     ..gains(100.0, 0.0, 0.05, 20.0, 0.05)
                 },
                 torso_orientation: Gains {
+                    kp: Vector3::new(200.0, 200.0, 100.0),
+                    kd: Vector3::new(20.0, 20.0, 10.0),
                     step_share: 0.5,
-                    kp: axes(200.0, 200.0, 100.0),
-                    kd: axes(20.0, 20.0, 10.0),
                     ..gains(0.0, 0.0, 0.3, 50.0, 0.05)
                 },
-                slack_weight: [20.0, 20.0, 5.0, 1.0, 1.0, 0.2],
+                foot_position: gains(100.0, 10.0, 0.05, 100.0, 0.02),
             },
             stops: StopSettings::default(),
             joint_margin: 0.01,
@@ -239,14 +238,13 @@ impl WbcSettings {
         }
     }
 
-    /// The same for a robot that walks.
-    #[must_use]
-    pub fn for_walking(&self) -> Self {
-        let WalkingSettings { torso_position, torso_orientation, slack_weight } = self.walking;
-        Self {
-            objectives: ObjectiveGains { torso_position, torso_orientation, ..self.objectives },
-            contact: ContactForceSettings { slack_weight, ..self.contact },
-            ..*self
+    /// The gains of one kind of objective of a robot that stands or walks.
+    pub fn gains(&self, kind: ObjectiveKind, walks: bool) -> &Gains {
+        match kind {
+            ObjectiveKind::TorsoPosition if walks => &self.walking.torso_position,
+            ObjectiveKind::TorsoOrientation if walks => &self.walking.torso_orientation,
+            ObjectiveKind::FootPosition(_) if walks => &self.walking.foot_position,
+            _ => self.objectives.of(kind),
         }
     }
 
@@ -263,6 +261,7 @@ impl WbcSettings {
             ("objectives.arm_posture", &objectives.arm_posture),
             ("walking.torso_position", &self.walking.torso_position),
             ("walking.torso_orientation", &self.walking.torso_orientation),
+            ("walking.foot_position", &self.walking.foot_position),
         ];
         for (table, gains) in tables {
             if !gains.kp.iter().chain(&gains.kd).all(|gain| *gain >= 0.0 && gain.is_finite()) {
@@ -270,6 +269,9 @@ impl WbcSettings {
             }
             if ![gains.max_error, gains.max_acceleration, gains.damping_start].into_iter().all(positive) {
                 return Some((table, "given max_error, max_acceleration and damping_start above 0"));
+            }
+            if !(0.0..=1.0).contains(&gains.step_share) {
+                return Some((table, "given a step_share of 0 to 1"));
             }
         }
         let contact = &self.contact;

@@ -1,40 +1,34 @@
 //! What the Go1's own protocol leaves of numbers: 32-bit floats, and fixed point for torques and gains.
 
+use locoman_robot::go1::MotorCommand;
 use locoman_robot::plant::JointCommand;
 
 /// Joints that hang on it: the legs'.
 const LEGS: usize = 12;
-/// Steps of a torque, a position gain and a velocity gain a unit (N m, N m/rad, N m s/rad).
-const TORQUE: f64 = 256.0;
-const KP: f64 = 32.0;
-const KD: f64 = 16.0;
 
 /// A leg command as a low-level datagram carries it; the arms' part stays.
 pub fn command(command: &JointCommand) -> JointCommand {
     let mut carried = *command;
     for joint in 0..LEGS {
-        carried.position[joint] = float32(command.position[joint]);
-        carried.velocity[joint] = float32(command.velocity[joint]);
-        carried.torque[joint] = fixed(command.torque[joint], TORQUE);
-        carried.kp[joint] = fixed(command.kp[joint], KP);
-        carried.kd[joint] = fixed(command.kd[joint], KD);
+        let JointCommand { position, velocity, torque, kp, kd, .. } = command;
+        let [q, dq, tau, kp, kd] = [position, velocity, torque, kp, kd].map(|of| of[joint] as f32);
+        let motor = MotorCommand::servo(q, dq, tau, kp, kd);
+        carried.position[joint] = motor.q_rad.into();
+        carried.velocity[joint] = motor.dq_rad_s.into();
+        carried.torque[joint] = motor.torque_n_m();
+        [carried.kp[joint], carried.kd[joint]] = motor.gains();
     }
     carried
 }
 
-/// A leg's torque as a state datagram carries it.
+/// A leg's torque as a state datagram carries it, in the steps of a command's.
 pub fn torque(value: f64) -> f64 {
-    fixed(value, TORQUE)
+    MotorCommand::servo(0.0, 0.0, value as f32, 0.0, 0.0).torque_n_m()
 }
 
 /// The nearest 32-bit float.
 pub fn float32(value: f64) -> f64 {
     f64::from(value as f32)
-}
-
-/// Fixed point, cut towards zero.
-fn fixed(value: f64, steps: f64) -> f64 {
-    (value * steps).trunc() / steps
 }
 
 #[cfg(test)]

@@ -33,13 +33,6 @@ pub enum Terrain {
         /// Its inclination, rad.
         rad: f64,
     },
-    /// A beam across the way.
-    Beam {
-        /// Height of its underside, m.
-        clearance_m: f64,
-        /// How deep it is along the way, m.
-        depth_m: f64,
-    },
 }
 
 /// Where rough ground begins ahead of the robot, how far it goes, and how far to either side, m.
@@ -48,18 +41,12 @@ const LENGTH_M: f64 = 2.5;
 const HALF_WIDTH_M: f64 = 1.0;
 /// Edge of a step, m: about the length of a foot's stride.
 const STEP_M: f64 = 0.25;
-/// Where a beam is, m.
-const BEAM_AT_M: f64 = 1.0;
+/// The plateau behind a ramp, m.
+const PLATEAU_M: f64 = 2.0;
 
 impl Terrain {
-    /// How far ahead of its start the robot has crossed it, m.
-    pub fn crossed_at_m(&self) -> f64 {
-        match self {
-            Self::Flat => 0.0,
-            Self::Steps { .. } | Self::Slope { .. } => FROM_M + LENGTH_M,
-            Self::Beam { depth_m, .. } => BEAM_AT_M + depth_m + 0.6,
-        }
-    }
+    /// How far ahead of its start the robot has crossed rough ground, m.
+    pub const CROSSED_AT_M: f64 = FROM_M + LENGTH_M;
 
     /// Its blocks, those with random heights by the seed.
     pub fn blocks(&self, seed: u64) -> Vec<Block> {
@@ -67,11 +54,6 @@ impl Terrain {
             Self::Flat => Vec::new(),
             Self::Steps { height_m } => steps(height_m, seed),
             Self::Slope { rad } => slope(rad).to_vec(),
-            Self::Beam { clearance_m, depth_m } => vec![Block {
-                center: Vector3::new(BEAM_AT_M + depth_m / 2.0, 0.0, clearance_m + 0.02),
-                half: Vector3::new(depth_m / 2.0, HALF_WIDTH_M, 0.02),
-                rotation: UnitQuaternion::identity(),
-            }],
         }
     }
 }
@@ -107,10 +89,9 @@ fn slope(rad: f64) -> [Block; 2] {
         half: Vector3::new(length / 2.0, HALF_WIDTH_M, THICK_M / 2.0),
         rotation: turn.into(),
     };
-    let flat_m = 2.0;
     let plateau = Block {
-        center: Vector3::new(FROM_M + run + flat_m / 2.0, 0.0, top - THICK_M / 2.0),
-        half: Vector3::new(flat_m / 2.0, HALF_WIDTH_M, THICK_M / 2.0),
+        center: Vector3::new(FROM_M + run + PLATEAU_M / 2.0, 0.0, top - THICK_M / 2.0),
+        half: Vector3::new(PLATEAU_M / 2.0, HALF_WIDTH_M, THICK_M / 2.0),
         rotation: UnitQuaternion::identity(),
     };
     [ramp, plateau]

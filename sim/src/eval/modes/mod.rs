@@ -33,6 +33,9 @@ pub fn run(configs: &Path, args: &Args, seed: u64) -> anyhow::Result<Report> {
         .into_par_iter()
         .map(|seed| tour::travel(configs, &args.profile, args.interruptions, seed))
         .collect::<anyhow::Result<_>>()?;
+    for (seed, broken) in (seed..).zip(&outcomes).filter_map(|(seed, o)| Some((seed, o.findings.broken()?))) {
+        tracing::warn!("seed {seed}: {broken}");
+    }
     let mut report = Report::new("modes", seed);
     let total = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>() as f64;
     report.push(Figure::new("pairs.tried", total(|o| o.tried), ""));

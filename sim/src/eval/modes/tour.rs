@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::eval::lockstep::{Lockstep, ticks};
 use crate::eval::robustness::monitor::Findings;
+use crate::eval::walking::tilt;
 use crate::robot::{EXCHANGE_S, Options};
 
 /// The modes.
@@ -30,6 +31,9 @@ const PATIENCE_S: f64 = 30.0;
 /// How long the robot stays in a mode, and how long at most before the next random request, s.
 const STAY_S: f64 = 0.3;
 const INTERRUPTED_S: f64 = 4.0;
+
+/// A robot that lies leans less than this, rad.
+const LYING_TILT_RAD: f64 = 0.5;
 
 /// Two modes, in order.
 pub type Pair = (Mode, Mode);
@@ -57,21 +61,9 @@ pub fn pairs() -> impl Iterator<Item = Pair> {
         .filter(|(from, to)| from != to)
 }
 
-/// In figures.
-pub const fn name(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Damped => "damped",
-        Mode::Stance => "stance",
-        Mode::Foot(Right) => "right_foot",
-        Mode::Foot(Left) => "left_foot",
-        Mode::Gripper(Right) => "right_gripper",
-        Mode::Gripper(Left) => "left_gripper",
-        Mode::Locomotion => "locomotion",
-        Mode::LocoManipulation(Arms::One(Right)) => "right_loco_manipulation",
-        Mode::LocoManipulation(Arms::One(Left)) => "left_loco_manipulation",
-        Mode::LocoManipulation(Arms::Both) => "loco_manipulation",
-        Mode::LieDown => "lie_down",
-    }
+/// In figures, as on the console: `right_gripper`.
+pub fn name(mode: Mode) -> String {
+    mode.to_message().as_str_name().trim_start_matches("MODE_").to_ascii_lowercase()
 }
 
 /// The order in which every pair comes once: each mode with all those before it, there and back.
@@ -100,9 +92,11 @@ pub fn travel(configs: &Path, profile: &str, interruptions: u64, seed: u64) -> a
     let mut outcome = Outcome::default();
     let watch = |sut: &mut Lockstep, outcome: &mut Outcome| -> anyhow::Result<bool> {
         sut.tick()?;
-        let lies = matches!(sut.snapshot().mode, Mode::LieDown) || !sut.snapshot().phase.is_balanced();
         outcome.findings.watch_limits(sut, &model, |_| {});
-        outcome.findings.falls = u64::from(sut.truth().fallen && !lies);
+        // One that lies down, or gets up, touches the ground; it does not lean.
+        let lies = !sut.snapshot().phase.is_balanced();
+        let fell = if lies { tilt(sut.truth()) > LYING_TILT_RAD } else { sut.truth().fallen };
+        outcome.findings.falls = u64::from(fell);
         Ok(outcome.findings.falls == 0)
     };
     for pair in stops().windows(2) {

@@ -16,6 +16,8 @@ pub const MUST_N: f64 = 180.0;
 /// Directions times phases.
 pub const TRIALS: usize = DIRECTIONS * PHASES;
 const DIRECTIONS: usize = 8;
+/// The directions to the left and to the right.
+pub const SIDEWAYS: [usize; 2] = [2, 6];
 const PHASES: usize = 10;
 /// How long it is pushed, and how long it may take to be itself again, s.
 const PUSH_S: f64 = 0.2;
@@ -41,25 +43,6 @@ pub fn survives(
     let end = sut.truth().time_ns + ((PUSH_S + RECOVERY_S) * 1e9) as u64;
     while sut.truth().time_ns < end {
         sut.tick()?;
-        if std::env::var_os("TRACE").is_some() && sut.truth().time_ns.is_multiple_of(20_000_000) {
-            let (t, s) = (*sut.truth(), sut.snapshot());
-            let f = sut.controller().wbc().dynamics().frame(locoman_robot::model::Frame::Torso);
-            println!(
-                "{:.3} p {:.2?} v {:.2?} ref {:.2?} tilt {:.2} rpy {:.2?} feet {:.2?} force {:.0?}",
-                (t.time_ns as i64 - end as i64) as f64 * 1e-9 + PUSH_S + RECOVERY_S,
-                t.world_from_torso.translation.vector.as_slice(),
-                f.velocity.fixed_rows::<3>(0).as_slice(),
-                s.torso.target.translation.vector.as_slice(),
-                super::start::tilt(&t),
-                t.world_from_torso.rotation.euler_angles(),
-                t.feet_in_world.map(|p| [
-                    p.x - t.world_from_torso.translation.x,
-                    p.y - t.world_from_torso.translation.y,
-                    p.z
-                ]),
-                t.foot_force_n,
-            );
-        }
         if sut.truth().fallen {
             tracing::debug!("pushed with {force_n} N from {direction}/{DIRECTIONS} at phase {phase}: fell");
             return Ok((direction, false));

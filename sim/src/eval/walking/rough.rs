@@ -30,7 +30,7 @@ pub fn crosses(configs: &Path, profile: &str, ground: Ground, seed: u64) -> anyh
     if let Some(coefficient) = friction {
         sut.plant_mut().disturb(&Disturbance::Friction { foot: None, coefficient })?;
     }
-    let way_m = if terrain == Terrain::Flat { 3.0 } else { terrain.crossed_at_m() };
+    let way_m = Terrain::CROSSED_AT_M;
     let start = sut.truth().world_from_torso;
     sut.walk(Some(velocity([SPEED_M_S, 0.0, 0.0])));
     let end = sut.truth().time_ns + (PATIENCE * way_m / SPEED_M_S * 1e9) as u64;
