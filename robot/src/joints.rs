@@ -83,6 +83,14 @@ impl Side {
         }
     }
 
+    /// The rear leg of this side.
+    pub const fn rear_leg(self) -> Leg {
+        match self {
+            Self::Right => Leg::RearRight,
+            Self::Left => Leg::RearLeft,
+        }
+    }
+
     /// Index of the arm's first joint; the other two follow.
     pub const fn first_arm_joint(self) -> usize {
         12 + 3 * self as usize

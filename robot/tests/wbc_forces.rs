@@ -8,7 +8,7 @@ use locoman_robot::{
     dynamics::Dynamics,
     wbc::{
         ForceFailure, WbcOutput, WbcSettings, WholeBodyController,
-        force::{ActiveSet, ForceProblem, ForceSolver, Forces, InteriorPoint, MAX_FORCES},
+        force::{ActiveSet, ForceProblem, ForceSolver, Forces, InteriorPoint, MAX_FORCES, MAX_POINTS},
     },
 };
 use proptest::prelude::*;
@@ -22,9 +22,9 @@ const INSIDE: f64 = 1e-7;
 
 /// H = B^T Q_2 B + Q_1 of random torso balances, as the controller makes them.
 fn problem() -> impl Strategy<Value = ForceProblem> {
-    let lever = prop::collection::vec(-0.3..0.3_f64, 12);
+    let lever = prop::collection::vec(-0.3..0.3_f64, MAX_FORCES);
     let wanted = prop::collection::vec(-1.0..1.0_f64, 6);
-    (1_usize..=4, lever, wanted, 0.0..0.05_f64, 0.2..1.5_f64).prop_map(build)
+    (1_usize..=MAX_POINTS, lever, wanted, 0.0..0.05_f64, 0.2..1.5_f64).prop_map(build)
 }
 
 fn build((feet, lever, wanted, least, most): (usize, Vec<f64>, Vec<f64>, f64, f64)) -> ForceProblem {
@@ -44,8 +44,8 @@ fn build((feet, lever, wanted, least, most): (usize, Vec<f64>, Vec<f64>, f64, f6
     }
     let d: [f64; 6] = std::array::from_fn(|row| wanted[row] * 5.0 + if row == 2 { 9.81 } else { 0.0 });
     let mut problem = ForceProblem::new(FRICTION);
-    problem.feet = feet;
-    (problem.min_vertical, problem.max_vertical) = ([least; 4], [most; 4]);
+    problem.points = feet;
+    (problem.min_vertical, problem.max_vertical) = ([least; MAX_POINTS], [most; MAX_POINTS]);
     for row in 0..3 * feet {
         for column in 0..3 * feet {
             problem.hessian[row][column] =
@@ -101,7 +101,7 @@ impl Met {
         let (mut friction, mut load, mut torque) = (false, false, false);
         for row in (0..problem.rows()).filter(active) {
             match row {
-                _ if row >= problem.foot_rows() => torque = true,
+                _ if row >= problem.point_rows() => torque = true,
                 _ if row % 6 < 4 => friction = true,
                 _ => load = true,
             }

@@ -56,7 +56,7 @@ fn forward_dynamics(bench: &Bench) -> Motion {
     let mut force = -dynamics.bias();
     for leg in Leg::ALL {
         let jacobian = dynamics.frame(Frame::Foot(leg)).jacobian;
-        force += jacobian.fixed_rows::<3>(0).tr_mul(&bench.output.foot_force[leg.index()]);
+        force += jacobian.fixed_rows::<3>(0).tr_mul(&bench.output.contact_force[leg.index()]);
     }
     for joint in 0..JOINTS {
         force[6 + joint] += bench.output.torque[joint];
@@ -111,7 +111,7 @@ fn forces_lie_in_the_pyramid(bench: &Bench, contacts: &ContactSet) {
     let settings = bench.sut.settings().contact;
     let weight = bench.model.mass() * 9.81;
     for leg in Leg::ALL {
-        let force = bench.output.foot_force[leg.index()];
+        let force = bench.output.contact_force[leg.index()];
         let most = settings.max_vertical * weight * contacts.share(leg);
         assert!(force.z <= most + INSIDE && force.z >= (settings.min_vertical * weight).min(most) - INSIDE);
         assert!(force.x.abs().max(force.y.abs()) <= settings.friction * force.z + INSIDE);
@@ -246,7 +246,7 @@ fn standing_still_takes_the_weight_and_asks_for_no_motion() {
         Objective::ArmPosture(Side::Left, PointReference::hold(stand().fixed_rows::<3>(15).into_owned())),
     ];
     let output = bench.step(&state, &objectives, &ContactSet::STANCE);
-    let total: Vector3<f64> = output.foot_force.iter().sum();
+    let total: Vector3<f64> = output.contact_force.iter().sum();
     // The slack costs little enough that a few millinewtons are saved.
     assert!((total.z - bench.model.mass() * 9.81).abs() < 0.5, "{total}");
     assert!((output.position - stand()).amax() < 1e-12);
@@ -291,7 +291,7 @@ fn without_contact_there_are_no_forces() {
     }
     let output = bench.step(&State::at_rest(stand()), &[], &contacts);
     assert_eq!(output.status.forces, ForceSource::NoContact);
-    assert!(output.foot_force.iter().all(|force| force.norm() == 0.0));
+    assert!(output.contact_force.iter().all(|force| force.norm() == 0.0));
     assert!(output.is_finite());
 }
 

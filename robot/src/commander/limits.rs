@@ -172,10 +172,14 @@ pub struct Limits {
     pub walking: WalkingLimits,
     /// Gripper.
     pub gripper: LimbRange,
+    /// Grippers of a robot that sits upright.
+    pub bimanual: LimbRange,
     /// Foot in the air.
     pub foot: LimbRange,
     /// Joints behind a gripper or a foot in the air.
     pub reach: ReachRange,
+    /// Joints behind the grippers of a robot that sits upright.
+    pub upright_reach: ReachRange,
     /// How fast the torso's target moves on four feet.
     pub stance_torso_rate: RateLimits,
     /// How fast the torso's target moves on three feet.
@@ -200,6 +204,14 @@ impl Default for Limits {
             pitch: Range::around_zero(0.3),
             yaw: Range::around_zero(0.4),
         };
+        let reach = ReachRange {
+            hip: Range::around_zero(0.83),
+            thigh: Range { min: -0.4, max: 2.2 },
+            calf: Range { min: -2.78, max: -0.95 },
+            arm_1: Range { min: -2.2, max: 1.7 },
+            clearance_m: 0.015,
+            ground_m: 0.015,
+        };
         Self {
             stance_torso: TorsoRange { z: Range { min: -0.12, max: 0.07 }, ..gripper_torso },
             gripper_torso,
@@ -221,18 +233,21 @@ impl Default for Limits {
                 outward: Range { min: -0.15, max: 0.22 },
                 z: Range { min: -0.15, max: 0.3 },
             },
+            bimanual: LimbRange {
+                x: Range { min: -0.25, max: 0.25 },
+                outward: Range { min: -0.2, max: 0.3 },
+                z: Range { min: -0.35, max: 0.65 },
+            },
             foot: LimbRange {
                 x: Range { min: -0.15, max: 0.15 },
                 outward: Range { min: -0.1, max: 0.15 },
                 z: Range { min: -0.08, max: 0.2 },
             },
-            reach: ReachRange {
-                hip: Range::around_zero(0.83),
-                thigh: Range { min: -0.4, max: 2.2 },
-                calf: Range { min: -2.78, max: -0.95 },
-                arm_1: Range { min: -2.2, max: 1.7 },
-                clearance_m: 0.015,
-                ground_m: 0.015,
+            reach,
+            upright_reach: ReachRange {
+                thigh: Range { min: -0.65, max: 2.4 },
+                calf: Range { min: -2.78, max: -0.92 },
+                ..reach
             },
             stance_torso_rate: RateLimits {
                 speed_m_s: 0.3,

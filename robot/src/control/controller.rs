@@ -11,7 +11,7 @@ use super::{
 use crate::{
     commander::{Command, Engagement, SampleClock},
     dynamics::State,
-    estimator::{KinematicEstimator, tilt_angle},
+    estimator::KinematicEstimator,
     joints::JointVector,
     modes::{self, Choreography, JointGains, Machine, Mode, Phase, Progress, Refusal, Scene, Start},
     plant::{JointCommand, Sensors},
@@ -78,7 +78,13 @@ impl Controller {
         Self {
             estimator: KinematicEstimator::new(control.estimator),
             machine: Machine::default(),
-            choreography: Choreography::new(control.poses, control.motions, config.limits, config.locomotion),
+            choreography: Choreography::new(
+                control.poses,
+                control.motions,
+                control.upright,
+                config.limits,
+                config.locomotion,
+            ),
             wbc: WholeBodyController::new(config.wbc),
             compensation: Compensation::new(control.compensation),
             output: WbcOutput::hold(posture),
@@ -247,7 +253,7 @@ impl Controller {
             Phase::Damped => posture::judge(&self.config.model, sensors),
             _ => Start::Down,
         };
-        let tilt_rad = tilt_angle(&sensors.attitude);
+        let tilt_rad = self.lean(sensors);
         let refusal = self.machine.step(&modes::Inputs {
             request,
             severity: assessment.severity,

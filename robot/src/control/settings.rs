@@ -10,7 +10,7 @@ use crate::{
     estimator::EstimatorSettings,
     locomotion::LocomotionSettings,
     model::{Model, ModelError},
-    modes::{JointGains, MotionSettings, PoseSettings},
+    modes::{JointGains, MotionSettings, PoseSettings, UprightSettings},
     supervisor::Thresholds,
     wbc::{SettingsError, WbcSettings},
 };
@@ -25,6 +25,8 @@ pub struct ControlSettings {
     pub poses: PoseSettings,
     /// Durations of scripted motions.
     pub motions: MotionSettings,
+    /// How the robot sits up.
+    pub upright: UprightSettings,
     /// Joint-level gains.
     pub gains: JointGains,
     /// What the joints learn.

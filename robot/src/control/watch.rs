@@ -1,12 +1,14 @@
 //! What a control step takes in besides the sensors: commands, stops, and the supervisor's judgement.
 
+use nalgebra::{UnitQuaternion, Vector3};
+
 use super::{
     controller::{Controller, Inputs},
     snapshot::CommandTrace,
 };
 use crate::{
     commander::Grip,
-    estimator::tilt_angle,
+    estimator::{tilt, tilt_angle},
     joints::Leg,
     plant::Sensors,
     supervisor::{Assessment, Flags, SensorHealth, Severity, Stop, assess},
@@ -50,6 +52,16 @@ impl Controller {
         }
     }
 
+    /// How far the torso leans: from level, or from where it should be while it sits up, is upright and comes down.
+    pub(super) fn lean(&self, sensors: &Sensors) -> f64 {
+        if !self.machine.phase().is_upright() {
+            return tilt_angle(&sensors.attitude);
+        }
+        let by_plan = self.choreography.setpoint().torso.rotation.orientation;
+        let up = |torso: UnitQuaternion<f64>| torso.inverse_transform_vector(&Vector3::z());
+        up(by_plan).angle(&up(tilt(&sensors.attitude)))
+    }
+
     pub(super) fn assess(
         &mut self,
         now_ns: u64,
@@ -64,7 +76,7 @@ impl Controller {
             .any(|leg| contacts.share(leg) >= 1.0 && sensors.foot_force[leg.index()] < threshold);
         let counts = floating && self.machine.phase().is_balanced();
         self.unloaded_ns = if counts { self.unloaded_ns + (self.dt_s * 1e9) as u64 } else { 0 };
-        let flags = self.flags(now_ns, tilt_angle(&sensors.attitude), health, inputs);
+        let flags = self.flags(now_ns, self.lean(sensors), health, inputs);
         let assessment = assess(&self.config.thresholds, &flags);
         if assessment.severity >= Severity::Disengage {
             self.engagement.end(inputs.command.as_ref());

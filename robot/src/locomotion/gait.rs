@@ -135,7 +135,7 @@ impl Gait {
     /// The feet that stand, with the share of the load that each may take: a foot is loaded after it lands and unloaded
     /// before it lifts.
     pub fn contacts(&self) -> ContactSet {
-        let mut contacts = ContactSet::of(&[]);
+        let mut contacts = ContactSet::NOTHING;
         for leg in Leg::ALL {
             if let LegPhase::Stance { for_s } = self.leg(leg) {
                 let left_s = if self.halted {

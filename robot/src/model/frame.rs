@@ -9,6 +9,10 @@ use crate::joints::{Leg, Side};
 /// with it. From the URDF; the calf's mesh ends in 0.0223 and MuJoCo Menagerie's Go1 has 0.023.
 pub const FOOT_RADIUS_M: f64 = 0.02;
 
+/// Height of a rear knee's joint above the ground on which the shank lies, m: the lowest point of thigh and calf there, by
+/// the shapes fitted to their meshes.
+pub const KNEE_RADIUS_M: f64 = 0.0195;
+
 /// A frame fixed to a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Frame {
@@ -16,13 +20,15 @@ pub enum Frame {
     Torso,
     /// A foot: centre of its sphere, axes of the calf.
     Foot(Leg),
+    /// The knee of the rear leg of this side: centre of its joint, axes of the calf.
+    Knee(Side),
     /// A gripper: grasp centre, -z out of the gripper.
     Gripper(Side),
 }
 
 impl Frame {
     /// How many there are.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = 9;
 
     /// All frames, in the order of [`Self::index`].
     pub const ALL: [Self; Self::COUNT] = [
@@ -33,6 +39,8 @@ impl Frame {
         Self::Foot(Leg::RearLeft),
         Self::Gripper(Side::Right),
         Self::Gripper(Side::Left),
+        Self::Knee(Side::Right),
+        Self::Knee(Side::Left),
     ];
 
     /// Place in arrays of [`Self::COUNT`].
@@ -41,6 +49,7 @@ impl Frame {
             Self::Torso => 0,
             Self::Foot(leg) => 1 + leg.index(),
             Self::Gripper(side) => 5 + side.index(),
+            Self::Knee(side) => 7 + side.index(),
         }
     }
 
@@ -49,6 +58,7 @@ impl Frame {
         match self {
             Self::Torso => None,
             Self::Foot(leg) => Some(leg.first_joint() + 2),
+            Self::Knee(side) => Some(side.rear_leg().first_joint() + 2),
             Self::Gripper(side) => Some(side.first_arm_joint() + 2),
         }
     }
@@ -56,7 +66,7 @@ impl Frame {
     /// Its pose in the frame of the body that carries it.
     pub(crate) fn body_from_frame(self, model: &Model) -> Isometry3<f64> {
         match self {
-            Self::Torso => Isometry3::identity(),
+            Self::Torso | Self::Knee(_) => Isometry3::identity(),
             Self::Foot(leg) => *model.calf_from_foot(leg),
             Self::Gripper(side) => *model.hand_from_gripper(side),
         }

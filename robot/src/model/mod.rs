@@ -22,7 +22,7 @@ pub use body::RigidBody;
 pub(crate) use body::point_inertia;
 pub use drives::Drives;
 pub use error::ModelError;
-pub use frame::{FOOT_RADIUS_M, Frame};
+pub use frame::{FOOT_RADIUS_M, Frame, KNEE_RADIUS_M};
 use nalgebra::{Isometry3, Unit, Vector3};
 pub use tree::{JOINT_NAMES, PARENT};
 

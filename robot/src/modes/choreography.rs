@@ -13,9 +13,10 @@ use super::{
     posture_motion::PostureMotion,
     scene::Scene,
     setpoint::Setpoint,
-    settings::{MotionSettings, PoseSettings},
+    settings::{MotionSettings, PoseSettings, UprightSettings},
     shift::Shift,
     touch_down::{Felt, TouchDown},
+    upright::{Node, Path, Upright},
 };
 use crate::{
     commander::{Limits, PointMotion, PoseMotion, PoseReference},
@@ -52,6 +53,10 @@ impl Progress {
         Self { arrived, ..Self::default() }
     }
 
+    fn on_two_feet(arrived: bool) -> Self {
+        Self { arrived, airborne: true, ..Self::default() }
+    }
+
     fn on_three_feet(arrived: bool) -> Self {
         Self { arrived, airborne: true, ..Self::default() }
     }
@@ -77,6 +82,9 @@ pub struct Choreography {
     /// Since when the foot that lifts is off the ground, s in the phase.
     airborne_s: Option<f64>,
     driving: Driving,
+    sitting: UprightSettings,
+    /// Since the robot left its four feet to sit up.
+    upright: Option<Upright>,
 }
 
 impl Choreography {
@@ -84,6 +92,7 @@ impl Choreography {
     pub fn new(
         poses: PoseSettings,
         motions: MotionSettings,
+        sitting: UprightSettings,
         limits: Limits,
         walking: LocomotionSettings,
     ) -> Self {
@@ -101,6 +110,8 @@ impl Choreography {
             landed: false,
             airborne_s: None,
             driving: Driving::new(limits, walking, &stand),
+            sitting,
+            upright: None,
             phase: Phase::Damped,
             entered_ns: 0,
             poses,
@@ -146,6 +157,7 @@ impl Choreography {
     pub fn take_up(&mut self, scene: &Scene<'_>, lifted: Option<Side>) {
         let arms = Side::ALL.map(|side| scene.desired_arm(side));
         self.setpoint = Setpoint::standing(&scene.state.world_from_torso, arms);
+        self.upright = None;
         if let Some(side) = lifted {
             self.setpoint.lift(side, PointReference::hold(scene.foot(side.leg())));
             self.setpoint.contacts = self.setpoint.row().contacts();
@@ -170,6 +182,7 @@ impl Choreography {
                 self.posture = PostureMotion::new(scene.desired, &fold, &fold, lie_down_s, 0.0);
             }
             Phase::Recentre => {
+                self.upright = None;
                 self.move_torso(&scene.middle_of_feet(self.poses.stand_height_m));
                 self.stow_arms(scene);
             }
@@ -194,6 +207,19 @@ impl Choreography {
                 }
             }
             Phase::Halt => self.stow_arms(scene),
+            // Half-way down it goes up again along the same path.
+            Phase::Kneel if self.upright.is_some() => {}
+            Phase::Kneel => {
+                let path = Path::plan(&self.poses, &self.sitting, scene);
+                self.upright = Some(Upright::begin(path, self.sitting, &self.setpoint));
+            }
+            Phase::SitUp | Phase::GetUp => {}
+            Phase::Bimanual => self.driving.begin_bimanual(&mut self.setpoint, scene),
+            Phase::SitDown => {
+                if let Some(upright) = &mut self.upright {
+                    upright.take_up_limbs(&self.motions, scene);
+                }
+            }
             Phase::Stow(side) => self.begin_stow(side, scene, &stand),
             Phase::LowerFoot(side) => self.begin_lowering(side, scene),
         }
@@ -268,6 +294,13 @@ impl Choreography {
                 }
                 Progress::on_four_feet(self.driving.is_halted() && self.arms_rest(elapsed_s))
             }
+            Phase::Kneel | Phase::SitDown => self.sit(Node::Kneel, scene),
+            Phase::SitUp => self.sit(Node::Upright, scene),
+            Phase::GetUp => self.sit(Node::Stand, scene),
+            Phase::Bimanual => {
+                self.driving.step(operator, scene, &mut self.setpoint);
+                Progress::on_two_feet(true)
+            }
             Phase::ShiftTorso(effector) => {
                 self.play(elapsed_s);
                 let may_lift = self.shift.may_lift(scene, effector, self.motions.lift_margin_m);
@@ -285,6 +318,12 @@ impl Choreography {
             }
             Phase::LowerFoot(side) => self.lower(side, elapsed_s, load_step, scene),
         }
+    }
+
+    /// On the way to sitting upright or back.
+    fn sit(&mut self, goal: Node, scene: &Scene<'_>) -> Progress {
+        let Some(upright) = &mut self.upright else { return Progress::default() };
+        Progress::on_two_feet(upright.step(goal, &self.motions, scene, &mut self.setpoint))
     }
 
     /// Unloads the foot, then lifts it and unfolds the arm.

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 
 use super::{
+    bimanual::Bimanual,
     mode::{Arms, Effector},
     scene::Scene,
     setpoint::Setpoint,
@@ -57,6 +58,8 @@ pub struct Driving {
     locomotion: LocomotionSettings,
     /// While the robot walks; the torso then is its posture about the course.
     walking: Option<Walking>,
+    /// While the robot sits upright.
+    bimanual: Option<Bimanual>,
     opening: [f64; 2],
     opening_goal: [f64; 2],
 }
@@ -77,6 +80,7 @@ impl Driving {
             player: None,
             locomotion,
             walking: None,
+            bimanual: None,
             opening: [0.0; 2],
             opening_goal: [0.0; 2],
             limits,
@@ -97,10 +101,18 @@ impl Driving {
     /// Takes over a robot that stands, to walk.
     pub fn begin_walk(&mut self, arms: Option<Arms>, setpoint: &Setpoint, scene: &Scene<'_>) {
         self.effector = None;
+        self.bimanual = None;
         let walking = Walking::begin(&self.locomotion, &self.limits, arms, setpoint, scene);
         let posture = walking.posture_of(&setpoint.torso);
         self.torso = DrivenBody::new(posture, self.limits.follower_rad_s, self.limits.stance_torso_rate);
         self.walking = Some(walking);
+    }
+
+    /// Takes over the grippers of a robot that sits upright.
+    pub fn begin_bimanual(&mut self, setpoint: &mut Setpoint, scene: &Scene<'_>) {
+        self.effector = None;
+        self.walking = None;
+        self.bimanual = Some(Bimanual::begin(&self.limits, setpoint, scene));
     }
 
     /// Whether a robot that walked stands on four feet again.
@@ -144,6 +156,7 @@ impl Driving {
 
     fn begin_torso(&mut self, setpoint: &Setpoint, rate: RateLimits, scene: &Scene<'_>) {
         self.walking = None;
+        self.bimanual = None;
         self.torso_reach = TorsoReach::new(&setpoint.torso.pose(), scene.desired);
         self.torso = DrivenBody::new(setpoint.torso, self.limits.follower_rad_s, rate);
         self.com_from_torso = None;
@@ -155,6 +168,13 @@ impl Driving {
         let played = self.player.as_ref().map(Player::sample);
         if self.walking.is_some() {
             return self.walk(played.as_ref(), scene, setpoint);
+        }
+        if let Some(bimanual) = &mut self.bimanual {
+            bimanual.step(played.as_ref(), scene, setpoint);
+            if let Some(sample) = &played {
+                self.open(&Side::ALL, &sample.opening);
+            }
+            return;
         }
         self.move_torso(played.as_ref(), scene, setpoint);
         match self.effector {
@@ -181,6 +201,7 @@ impl Driving {
             });
         }
         self.gripper_reach.pause(grip == Grip::Frozen);
+        self.bimanual.iter_mut().for_each(|bimanual| bimanual.pause(grip == Grip::Frozen));
         if let Some(player) = &mut self.player {
             player.advance(grip == Grip::Holds, scene.dt_s);
         }
@@ -191,6 +212,7 @@ impl Driving {
                 self.torso.engage();
                 self.limb.engage();
                 self.walking.iter_mut().for_each(Walking::engage);
+                self.bimanual.iter_mut().for_each(Bimanual::engage);
                 self.player = command.trajectory.as_ref().map(Player::new);
             }
             Grip::Resumes => self.release(),
@@ -204,6 +226,10 @@ impl Driving {
         self.torso.displace(command.torso.as_ref(), operator.clock, scene.now_ns);
         if let Some(walking) = &mut self.walking {
             walking.displace(command, operator.clock, scene.now_ns);
+            self.open(&Side::ALL, &command.opening);
+        }
+        if let Some(bimanual) = &mut self.bimanual {
+            bimanual.displace(command, operator.clock, scene.now_ns);
             self.open(&Side::ALL, &command.opening);
         }
         match self.effector {
@@ -230,6 +256,7 @@ impl Driving {
         self.torso.release();
         self.limb.release();
         self.walking.iter_mut().for_each(Walking::release);
+        self.bimanual.iter_mut().for_each(Bimanual::release);
         self.gripper_reach.stay();
         self.player = None;
     }

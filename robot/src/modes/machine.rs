@@ -195,6 +195,18 @@ impl Machine {
                 Phase::Walk
             }
             Phase::Halt if inputs.arrived => Phase::Recentre,
+            Phase::Kneel if self.goal != Mode::Bimanual => self.turn_back(Mode::Bimanual, Phase::GetUp),
+            Phase::Kneel if inputs.arrived => Phase::SitUp,
+            Phase::SitUp if self.goal != Mode::Bimanual => self.turn_back(Mode::Bimanual, Phase::SitDown),
+            Phase::SitUp if inputs.arrived => {
+                self.mode = self.goal;
+                Phase::Bimanual
+            }
+            Phase::Bimanual if self.goal != Mode::Bimanual => Phase::SitDown,
+            Phase::SitDown if self.goal == Mode::Bimanual => Phase::SitUp,
+            Phase::SitDown if inputs.arrived => Phase::GetUp,
+            Phase::GetUp if self.goal == Mode::Bimanual => Phase::Kneel,
+            Phase::GetUp if inputs.arrived => Phase::Recentre,
             Phase::ShiftTorso(effector) if wanted != Some(effector) => {
                 self.turn_back(effector.mode(), Phase::Recentre)
             }
@@ -239,6 +251,7 @@ impl Machine {
                 Phase::Walk
             }
             Mode::LocoManipulation(arms) => Phase::Unfold(arms),
+            Mode::Bimanual => Phase::Kneel,
             Mode::Damped | Mode::Stance | Mode::LieDown => Phase::Stance,
         }
     }

@@ -12,6 +12,7 @@
 //! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves, and where the
 //! operator moves, [`Driving`] does.
 
+mod bimanual;
 mod choreography;
 mod driving;
 mod foot_path;
@@ -25,6 +26,7 @@ mod settings;
 mod shift;
 pub mod table;
 mod touch_down;
+mod upright;
 mod walking;
 
 pub use choreography::{Choreography, Progress};
@@ -33,4 +35,4 @@ pub use machine::{Inputs, Machine, Refusal, Request, Start};
 pub use mode::{Arms, Effector, Mode, Phase};
 pub use scene::Scene;
 pub use setpoint::{ObjectiveList, Setpoint};
-pub use settings::{JointGains, MotionSettings, PoseSettings};
+pub use settings::{JointGains, MotionSettings, PoseSettings, UprightSettings};

@@ -67,6 +67,8 @@ pub enum Mode {
     Locomotion,
     /// Walking, while arms hold and turn their grippers.
     LocoManipulation(Arms),
+    /// Sitting upright, both grippers follow.
+    Bimanual,
     /// Lying on the belly, then damped.
     LieDown,
 }
@@ -77,9 +79,12 @@ impl Mode {
         match self {
             Self::Foot(side) => Some(Effector::Foot(side)),
             Self::Gripper(side) => Some(Effector::Gripper(side)),
-            Self::Damped | Self::Stance | Self::Locomotion | Self::LocoManipulation(_) | Self::LieDown => {
-                None
-            }
+            Self::Damped
+            | Self::Stance
+            | Self::Locomotion
+            | Self::LocoManipulation(_)
+            | Self::Bimanual
+            | Self::LieDown => None,
         }
     }
 
@@ -103,6 +108,7 @@ impl Mode {
             messages::Mode::RightLocoManipulation => Some(Self::LocoManipulation(Arms::One(Side::Right))),
             messages::Mode::LeftLocoManipulation => Some(Self::LocoManipulation(Arms::One(Side::Left))),
             messages::Mode::LocoManipulation => Some(Self::LocoManipulation(Arms::Both)),
+            messages::Mode::Bimanual => Some(Self::Bimanual),
         }
     }
 
@@ -119,6 +125,7 @@ impl Mode {
             Self::LocoManipulation(Arms::One(Side::Right)) => messages::Mode::RightLocoManipulation,
             Self::LocoManipulation(Arms::One(Side::Left)) => messages::Mode::LeftLocoManipulation,
             Self::LocoManipulation(Arms::Both) => messages::Mode::LocoManipulation,
+            Self::Bimanual => messages::Mode::Bimanual,
             Self::LieDown => messages::Mode::LieDown,
         }
     }
@@ -155,13 +162,23 @@ pub enum Phase {
     WalkHolding(Arms),
     /// Slows down, steps until all feet are in their places, stands. Arms fold.
     Halt,
+    /// The torso goes back and the knees to the ground, until shanks alone carry.
+    Kneel,
+    /// The torso rises, leg and arm of each side come before it.
+    SitUp,
+    /// Upright, the operator moves both grippers.
+    Bimanual,
+    /// The torso comes down until the front feet are on the ground.
+    SitDown,
+    /// The knees leave the ground, the torso goes over the feet.
+    GetUp,
     /// Joints go to the fold, then damp.
     LieDown,
 }
 
 impl Phase {
     /// All of them.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 34] = [
         Self::Damped,
         Self::StandUp,
         Self::Recentre,
@@ -190,6 +207,11 @@ impl Phase {
         Self::WalkHolding(Arms::One(Side::Left)),
         Self::WalkHolding(Arms::Both),
         Self::Halt,
+        Self::Kneel,
+        Self::SitUp,
+        Self::Bimanual,
+        Self::SitDown,
+        Self::GetUp,
         Self::LieDown,
     ];
 
@@ -210,6 +232,11 @@ impl Phase {
             Self::Unfold(_) => "unfold arms",
             Self::WalkHolding(_) => "walk and hold",
             Self::Halt => "halt",
+            Self::Kneel => "kneel",
+            Self::SitUp => "sit up",
+            Self::Bimanual => "bimanual",
+            Self::SitDown => "sit down",
+            Self::GetUp => "get up",
             Self::LieDown => "lie down",
         }
     }
@@ -229,14 +256,29 @@ impl Phase {
                 | Self::SingleGripper(_)
                 | Self::Stow(_)
                 | Self::LowerFoot(_)
-        )
+        ) || self.is_kneeling()
+    }
+
+    /// On the shanks of the rear legs, or on the way there or back.
+    pub const fn is_kneeling(self) -> bool {
+        matches!(self, Self::Kneel | Self::SitUp | Self::Bimanual | Self::SitDown | Self::GetUp)
+    }
+
+    /// The torso is upright, or on the way there or back: it leans as far as it should.
+    pub const fn is_upright(self) -> bool {
+        matches!(self, Self::SitUp | Self::Bimanual | Self::SitDown)
     }
 
     /// The operator moves the robot.
     pub const fn is_driven(self) -> bool {
         matches!(
             self,
-            Self::Stance | Self::SingleFoot(_) | Self::SingleGripper(_) | Self::Walk | Self::WalkHolding(_)
+            Self::Stance
+                | Self::SingleFoot(_)
+                | Self::SingleGripper(_)
+                | Self::Walk
+                | Self::WalkHolding(_)
+                | Self::Bimanual
         )
     }
 

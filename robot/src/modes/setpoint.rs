@@ -10,7 +10,7 @@ use crate::{
     commander::{PoseReference, rebased_point},
     joints::{Leg, Side},
     locomotion::Steps,
-    wbc::{ContactSet, Objective, ObjectiveKind, PointReference, RotationReference},
+    wbc::{ContactPoint, ContactSet, Objective, ObjectiveKind, PointReference, RotationReference},
 };
 
 /// References of all bodies, which of them are in force, and the feet that stand.
@@ -77,6 +77,22 @@ impl Setpoint {
     pub fn grasp(&mut self, side: Side, gripper: PoseReference) {
         self.row = &table::SINGLE_GRIPPER[side.index()];
         self.grippers[side.index()] = gripper;
+    }
+
+    /// The robot kneels, or is about to: its front feet, where they are in the air, and its arms are led.
+    pub fn kneel(&mut self) {
+        self.row = &table::KNEELING;
+    }
+
+    /// Where a foot in the air should be.
+    pub fn lead_foot(&mut self, leg: Leg, foot: PointReference) {
+        self.feet[leg.index()] = foot;
+    }
+
+    /// The robot is upright: its grippers are there; those of limbs that are led by foot and arm are not tracked.
+    pub fn grasp_upright(&mut self, grippers: [PoseReference; 2], led: [bool; 2]) {
+        self.row = table::bimanual(led);
+        self.grippers = grippers;
     }
 
     /// The robot walks; grippers of these arms are turned.
@@ -166,7 +182,12 @@ impl Setpoint {
 
     /// Moves a foot's share of the load towards `share` by at most `step`.
     pub fn load(&mut self, leg: Leg, share: f64, step: f64) {
-        let now = self.contacts.share(leg);
-        self.contacts = self.contacts.with_share(leg, now + (share - now).clamp(-step, step));
+        self.load_point(ContactPoint::Foot(leg), share, step);
+    }
+
+    /// Moves a point's share of the load towards `share` by at most `step`.
+    pub fn load_point(&mut self, point: ContactPoint, share: f64, step: f64) {
+        let now = self.contacts.share_of(point);
+        self.contacts = self.contacts.with(point, now + (share - now).clamp(-step, step));
     }
 }

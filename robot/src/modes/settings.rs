@@ -20,6 +20,8 @@ pub struct PoseSettings {
     pub left_ready_rad: Vector3<f64>,
     /// The left arm as it is carried while walking, rad; the right one has joint 2 mirrored.
     pub left_carry_rad: Vector3<f64>,
+    /// Hip, thigh, calf of the front legs of a robot that sits upright, rad; the arms are ready.
+    pub upright_rad: Vector3<f64>,
     /// Torso's origin above the feet's centres in stance, m.
     pub stand_height_m: f64,
     /// How far the torso rises before a foot lifts, m.
@@ -42,6 +44,7 @@ impl Default for PoseSettings {
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
             left_carry_rad: Vector3::new(-2.24, 0.3, 0.0),
+            upright_rad: Vector3::new(0.0, 1.85, -1.95),
             stand_height_m: 0.265,
             rise_m: 0.04,
             shift_margin_m: 0.07,
@@ -159,6 +162,40 @@ impl Default for MotionSettings {
             search_m: 0.04,
             lie_down_s: 2.5,
             lift_margin_m: 0.02,
+        }
+    }
+}
+
+/// How the robot sits up. Places of the centre of mass are in front of the rear feet, m.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UprightSettings {
+    /// When the knees come to the ground.
+    pub touch_com_m: f64,
+    /// When the front feet are unloaded.
+    pub kneel_com_m: f64,
+    /// When the torso is upright.
+    pub upright_com_m: f64,
+    /// Pitch of the upright torso, nose up, rad.
+    pub pitch_rad: f64,
+    /// From four feet until the knees touch the ground, s.
+    pub touch_s: f64,
+    /// From there until the front feet are unloaded, s.
+    pub kneel_s: f64,
+    /// From there to the upright torso, s.
+    pub rise_s: f64,
+}
+
+impl Default for UprightSettings {
+    fn default() -> Self {
+        Self {
+            touch_com_m: 0.04,
+            kneel_com_m: -0.055,
+            upright_com_m: -0.105,
+            pitch_rad: std::f64::consts::FRAC_PI_2,
+            touch_s: 2.0,
+            kneel_s: 2.0,
+            rise_s: 4.0,
         }
     }
 }

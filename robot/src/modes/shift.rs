@@ -14,6 +14,7 @@ use crate::{
     dynamics::{Dynamics, State},
     joints::{JointVector, Leg},
     kinematics::leg_towards,
+    model::Model,
     wbc::ContactSet,
 };
 
@@ -52,14 +53,14 @@ impl Shift {
         let mut torso = Isometry3::translation(0.0, 0.0, poses.rise_m);
         for _ in 0..ROUNDS {
             lift(&mut posture, poses, scene, effector, &torso);
-            let com = from_above(&centre_of_mass(scene, &torso, &posture));
+            let com = from_above(&centre_of_mass(scene.model, &torso, &posture));
             way = (way + push_inside(&com, feet, margin_m)).cap_magnitude(FARTHEST_M);
             torso.translation.vector = Vector3::new(way.x, way.y, poses.rise_m);
         }
         lift(&mut posture, poses, scene, effector, &torso);
-        let lifted = centre_of_mass(scene, &torso, &posture);
+        let lifted = centre_of_mass(scene.model, &torso, &posture);
         stand(&mut posture, poses, scene, leg, &scene.foot(leg), &torso);
-        let standing = centre_of_mass(scene, &torso, &posture);
+        let standing = centre_of_mass(scene.model, &torso, &posture);
         Self { torso, com_by_lifting: from_above(&(lifted - standing)) }
     }
 
@@ -107,9 +108,10 @@ fn stand(
     }
 }
 
-fn centre_of_mass(scene: &Scene<'_>, torso: &Isometry3<f64>, posture: &JointVector) -> Vector3<f64> {
+/// In the world, of a robot at rest.
+pub(super) fn centre_of_mass(model: &Model, torso: &Isometry3<f64>, posture: &JointVector) -> Vector3<f64> {
     let mut dynamics = Dynamics::new();
-    dynamics.update(scene.model, &State { world_from_torso: *torso, ..State::at_rest(*posture) });
+    dynamics.update(model, &State { world_from_torso: *torso, ..State::at_rest(*posture) });
     *dynamics.com()
 }
 
@@ -149,7 +151,7 @@ mod tests {
     fn margin(poses: &PoseSettings, scene: &Scene<'_>, effector: Effector, torso: &Isometry3<f64>) -> f64 {
         let mut posture = poses.posture(&poses.stand_rad);
         lift(&mut posture, poses, scene, effector, torso);
-        let com = from_above(&centre_of_mass(scene, torso, &posture));
+        let com = from_above(&centre_of_mass(scene.model, torso, &posture));
         let (feet, count) = scene.standing_feet(&ContactSet::without(effector.side().leg()));
         let inside = |margin_m| push_inside(&com, &feet[..count], margin_m) == Vector2::zeros();
         (0..200).map(|mm| f64::from(mm) * 1e-3).take_while(|margin_m| inside(*margin_m)).last().unwrap_or(0.0)

@@ -8,6 +8,7 @@ use super::mode::{Arms, Mode};
 use crate::{
     joints::{Leg, Side},
     wbc::{
+        ContactPoint::{self, Foot, Knee},
         ContactSet,
         ObjectiveKind::{
             self, ArmPosture, FootPosition, GripperOrientation, GripperPosition, TorsoOrientation,
@@ -23,12 +24,12 @@ pub struct Row {
     pub mode: Mode,
     /// What is tracked, the most important first.
     pub objectives: &'static [ObjectiveKind],
-    /// The feet that stand.
-    pub stance: &'static [Leg],
+    /// What stands on the ground.
+    pub stance: &'static [ContactPoint],
 }
 
 impl Row {
-    /// The feet that stand, in full contact.
+    /// What stands, in full contact.
     pub fn contacts(&self) -> ContactSet {
         ContactSet::of(self.stance)
     }
@@ -39,14 +40,21 @@ impl Row {
     }
 }
 
-const ALL_BUT_FRONT_RIGHT: &[Leg] = &[Leg::FrontLeft, Leg::RearRight, Leg::RearLeft];
-const ALL_BUT_FRONT_LEFT: &[Leg] = &[Leg::FrontRight, Leg::RearRight, Leg::RearLeft];
+const FEET: &[ContactPoint] =
+    &[Foot(Leg::FrontRight), Foot(Leg::FrontLeft), Foot(Leg::RearRight), Foot(Leg::RearLeft)];
+const ALL_BUT_FRONT_RIGHT: &[ContactPoint] =
+    &[Foot(Leg::FrontLeft), Foot(Leg::RearRight), Foot(Leg::RearLeft)];
+const ALL_BUT_FRONT_LEFT: &[ContactPoint] =
+    &[Foot(Leg::FrontRight), Foot(Leg::RearRight), Foot(Leg::RearLeft)];
+/// The paper has the rear feet alone; what really carries a robot that sits is feet and knees.
+const SHANKS: &[ContactPoint] =
+    &[Foot(Leg::RearRight), Foot(Leg::RearLeft), Knee(Side::Right), Knee(Side::Left)];
 
 /// Standing on four feet.
 pub static STANCE: Row = Row {
     mode: Mode::Stance,
     objectives: &[TorsoPosition, TorsoOrientation, ArmPosture(Side::Right), ArmPosture(Side::Left)],
-    stance: &Leg::ALL,
+    stance: FEET,
 };
 
 /// Single-foot manipulation, right and left.
@@ -105,7 +113,7 @@ pub static SINGLE_GRIPPER: [Row; 2] = [
 pub static LOCOMOTION: Row = Row {
     mode: Mode::Locomotion,
     objectives: &walking(ArmPosture(Side::Right), ArmPosture(Side::Left)),
-    stance: &Leg::ALL,
+    stance: FEET,
 };
 
 /// Loco-manipulation with the right arm, the left arm, both.
@@ -113,18 +121,75 @@ pub static LOCO_MANIPULATION: [Row; 3] = [
     Row {
         mode: Mode::LocoManipulation(Arms::One(Side::Right)),
         objectives: &walking(GripperOrientation(Side::Right), ArmPosture(Side::Left)),
-        stance: &Leg::ALL,
+        stance: FEET,
     },
     Row {
         mode: Mode::LocoManipulation(Arms::One(Side::Left)),
         objectives: &walking(GripperOrientation(Side::Left), ArmPosture(Side::Right)),
-        stance: &Leg::ALL,
+        stance: FEET,
     },
     Row {
         mode: Mode::LocoManipulation(Arms::Both),
         objectives: &walking(GripperOrientation(Side::Right), GripperOrientation(Side::Left)),
-        stance: &Leg::ALL,
+        stance: FEET,
     },
+];
+
+/// On the way to sitting upright and back. The orientation comes first: on its shanks the torso has two freedoms, and what
+/// it must not do is lean.
+pub static KNEELING: Row = KNEELING_ROW;
+const KNEELING_ROW: Row = Row {
+    mode: Mode::Bimanual,
+    objectives: &[
+        TorsoOrientation,
+        TorsoPosition,
+        FootPosition(Leg::FrontRight),
+        FootPosition(Leg::FrontLeft),
+        ArmPosture(Side::Right),
+        ArmPosture(Side::Left),
+    ],
+    stance: SHANKS,
+};
+
+/// Bimanual manipulation; then with the right limb led by foot and arm, the left, both.
+pub static BIMANUAL: [Row; 4] = [
+    Row {
+        mode: Mode::Bimanual,
+        objectives: &[
+            TorsoOrientation,
+            TorsoPosition,
+            GripperPosition(Side::Right),
+            GripperPosition(Side::Left),
+            GripperOrientation(Side::Right),
+            GripperOrientation(Side::Left),
+        ],
+        stance: SHANKS,
+    },
+    Row {
+        mode: Mode::Bimanual,
+        objectives: &[
+            TorsoOrientation,
+            TorsoPosition,
+            FootPosition(Leg::FrontRight),
+            GripperPosition(Side::Left),
+            GripperOrientation(Side::Left),
+            ArmPosture(Side::Right),
+        ],
+        stance: SHANKS,
+    },
+    Row {
+        mode: Mode::Bimanual,
+        objectives: &[
+            TorsoOrientation,
+            TorsoPosition,
+            FootPosition(Leg::FrontLeft),
+            GripperPosition(Side::Right),
+            GripperOrientation(Side::Right),
+            ArmPosture(Side::Left),
+        ],
+        stance: SHANKS,
+    },
+    KNEELING_ROW,
 ];
 
 /// Torso, feet, and then the arms.
@@ -151,8 +216,13 @@ pub fn loco_manipulation(arms: Arms) -> &'static Row {
     }
 }
 
+/// The row of bimanual manipulation; `led` are the limbs right, left that foot and arm lead.
+pub fn bimanual(led: [bool; 2]) -> &'static Row {
+    &BIMANUAL[usize::from(led[0]) + 2 * usize::from(led[1])]
+}
+
 /// All rows.
-pub static TABLE: [&Row; 9] = [
+pub static TABLE: [&Row; 10] = [
     &STANCE,
     &SINGLE_FOOT[0],
     &SINGLE_FOOT[1],
@@ -162,6 +232,7 @@ pub static TABLE: [&Row; 9] = [
     &LOCO_MANIPULATION[0],
     &LOCO_MANIPULATION[1],
     &LOCO_MANIPULATION[2],
+    &BIMANUAL[0],
 ];
 
 /// The most objectives in a row.
@@ -202,6 +273,10 @@ mod tests {
                 Mode::LocoManipulation(_) => {
                     ("Torso Position | Torso Orientation | Foot Position | Gripper Orientation", 4)
                 }
+                // The torso is not held in the paper's table, but is in its text; feet and knees carry.
+                Mode::Bimanual => {
+                    ("Torso Orientation | Torso Position | Gripper Position | Gripper Orientation", 4)
+                }
                 // Not in the paper's table: where its switchers begin and end.
                 _ => ("Torso Position | Torso Orientation", 4),
             };
@@ -226,7 +301,7 @@ mod tests {
                     continue;
                 }
                 let foot = row.controls(FootPosition(side.leg()));
-                assert_ne!(row.stance.contains(&side.leg()), gripper || foot, "{:?}", row.mode);
+                assert_ne!(row.stance.contains(&Foot(side.leg())), gripper || foot, "{:?}", row.mode);
             }
         }
     }

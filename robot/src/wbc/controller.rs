@@ -175,8 +175,8 @@ impl WholeBodyController {
     ) {
         let dynamics = &self.dynamics;
         self.tracking.begin(dynamics.mass_matrix());
-        for leg in contacts.legs() {
-            self.tracking.add(Task::contact(dynamics, leg), 0.0);
+        for task in Task::contacts(dynamics, contacts) {
+            self.tracking.add(task, 0.0);
         }
         let contact_levels = self.tracking.levels();
         for objective in objectives {
@@ -228,7 +228,7 @@ impl WholeBodyController {
             output.velocity[joint] = velocity[6 + joint];
             output.torque[joint] = reaction.effort[6 + joint];
         }
-        output.foot_force = reaction.force;
+        output.contact_force = reaction.force;
         output.torso_slack = reaction.slack;
         output
     }
@@ -241,8 +241,8 @@ impl WholeBodyController {
 fn follow(tracking: &mut Tracking, around: &Surroundings, torso: &[Vector6<f64>; 3], tracked: &mut Tracked) {
     let Surroundings { state, dynamics, settings, .. } = *around;
     tracking.restart();
-    for leg in around.contacts.legs() {
-        tracking.add(Task::contact(dynamics, leg).unmoved(), 0.0);
+    for task in Task::contacts(dynamics, around.contacts) {
+        tracking.add(task.unmoved(), 0.0);
     }
     for task in Task::torso(torso) {
         tracking.add(task, 0.0);

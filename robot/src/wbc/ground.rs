@@ -3,20 +3,19 @@
 use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
 use super::{
-    ContactForceSettings, ContactSet, ForceFailure, ForceSource,
+    ContactForceSettings, ContactPoint, ContactSet, ForceFailure, ForceSource,
     force::{ActiveSet, ForceProblem, ForceSolver, Forces, InteriorPoint, MAX_FORCES, TorqueLimits},
 };
 use crate::{
     dynamics::{Dynamics, Motion},
-    joints::Leg,
-    model::{Frame, GRAVITY, Model},
+    model::{GRAVITY, Model},
 };
 
 /// Contact forces of a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GroundReaction {
-    /// f_r of each leg in the world, N.
-    pub(super) force: [Vector3<f64>; 4],
+    /// f_r of each point in the world, N.
+    pub(super) force: [Vector3<f64>; ContactPoint::COUNT],
     /// δ_t, in the torso's frame.
     pub(super) slack: Vector6<f64>,
     /// A (q̈ + (δ_t, 0)) + b + g - J_cᵀ f_r: what torso and joints have to give. N, N m.
@@ -34,7 +33,7 @@ pub(super) struct ForceDistribution {
     second: InteriorPoint,
     /// For measurements: the second solver in every step.
     second_only: bool,
-    last: [Vector3<f64>; 4],
+    last: [Vector3<f64>; ContactPoint::COUNT],
 }
 
 /// B and d of δ_t = B f - d, with forces in body weights.
@@ -51,7 +50,7 @@ impl ForceDistribution {
             first: ActiveSet::default(),
             second: InteriorPoint::new(settings.friction),
             second_only: false,
-            last: [Vector3::zeros(); 4],
+            last: [Vector3::zeros(); ContactPoint::COUNT],
         }
     }
 
@@ -76,16 +75,16 @@ impl ForceDistribution {
         let weight = model.mass() * GRAVITY;
         let unaided = dynamics.inverse_dynamics(acceleration);
         let balance = TorsoBalance::new(dynamics, contacts, &unaided, weight)?;
-        self.set_feet(contacts);
+        self.set_points(contacts);
         self.set_cost(&balance);
         self.set_torque_limits(model, dynamics, contacts, &balance, &unaided, weight);
 
         let mut forces: Forces = [0.0; MAX_FORCES];
         let (source, torques_relaxed) = self.find(contacts, weight, &mut forces);
         let slack = (balance.from_forces * SMatrix::from(forces) - balance.wanted) * weight;
-        let mut force = [Vector3::zeros(); 4];
-        for (slot, leg) in contacts.legs().enumerate() {
-            force[leg.index()] = Vector3::from_column_slice(&forces[3 * slot..3 * slot + 3]) * weight;
+        let mut force = [Vector3::zeros(); ContactPoint::COUNT];
+        for (slot, point) in contacts.points().enumerate() {
+            force[point.index()] = Vector3::from_column_slice(&forces[3 * slot..3 * slot + 3]) * weight;
         }
         self.last = force;
         let effort =
@@ -95,7 +94,7 @@ impl ForceDistribution {
 
     /// Solves the problem: with the torque limits, else without.
     fn find(&mut self, contacts: &ContactSet, weight: f64, forces: &mut Forces) -> (ForceSource, bool) {
-        if self.problem.feet == 0 {
+        if self.problem.points == 0 {
             return (ForceSource::NoContact, false);
         }
         let mut failure = match self.try_both(forces) {
@@ -130,14 +129,14 @@ impl ForceDistribution {
         self.second.solve(&self.problem, forces).map(|()| ForceSource::InteriorPoint)
     }
 
-    fn set_feet(&mut self, contacts: &ContactSet) {
+    fn set_points(&mut self, contacts: &ContactSet) {
         let problem = &mut self.problem;
-        problem.feet = 0;
-        for leg in contacts.legs() {
-            let most = self.settings.max_vertical * contacts.share(leg);
-            problem.max_vertical[problem.feet] = most;
-            problem.min_vertical[problem.feet] = self.settings.min_vertical.min(most);
-            problem.feet += 1;
+        problem.points = 0;
+        for point in contacts.points() {
+            let most = self.settings.max_vertical * contacts.share_of(point);
+            problem.max_vertical[problem.points] = most;
+            problem.min_vertical[problem.points] = self.settings.min_vertical.min(most);
+            problem.points += 1;
         }
     }
 
@@ -171,14 +170,16 @@ impl ForceDistribution {
     ) {
         let limits = &mut self.problem.torque;
         *limits = TorqueLimits::NONE;
-        for (slot, leg) in contacts.legs().enumerate() {
-            let jacobian = &dynamics.frame(Frame::Foot(leg)).jacobian;
+        for leg in contacts.legs() {
             for joint in leg.first_joint()..leg.first_joint() + 3 {
                 // A is symmetric.
                 let coupling = dynamics.mass_matrix().fixed_view::<6, 1>(0, 6 + joint);
                 let mut row = balance.from_forces.tr_mul(&coupling);
-                for axis in 0..3 {
-                    row[3 * slot + axis] -= jacobian[(axis, 6 + joint)];
+                for (slot, point) in contacts.points().enumerate().filter(|(_, point)| point.leg() == leg) {
+                    let jacobian = &dynamics.frame(point.frame()).jacobian;
+                    for axis in 0..3 {
+                        row[3 * slot + axis] -= jacobian[(axis, 6 + joint)];
+                    }
                 }
                 let start = unaided[6 + joint] / weight - coupling.dot(&balance.wanted);
                 let most = model.max_torque[joint] / weight;
@@ -194,8 +195,8 @@ impl ForceDistribution {
     fn recall(&self, contacts: &ContactSet, weight: f64, forces: &mut Forces) {
         let problem = &self.problem;
         *forces = [0.0; MAX_FORCES];
-        for (slot, leg) in contacts.legs().enumerate() {
-            let last = self.last[leg.index()] / weight;
+        for (slot, point) in contacts.points().enumerate() {
+            let last = self.last[point.index()] / weight;
             let vertical = last.z.clamp(problem.min_vertical[slot], problem.max_vertical[slot]);
             let side = problem.friction * vertical;
             forces[3 * slot] = last.x.clamp(-side, side);
@@ -211,8 +212,8 @@ impl TorsoBalance {
         let torso: Matrix6<f64> = dynamics.mass_matrix().fixed_view::<6, 6>(0, 0).into_owned();
         let factor = torso.cholesky()?;
         let mut from_forces = SMatrix::<f64, 6, MAX_FORCES>::zeros();
-        for (slot, leg) in contacts.legs().enumerate() {
-            let jacobian = &dynamics.frame(Frame::Foot(leg)).jacobian;
+        for (slot, point) in contacts.points().enumerate() {
+            let jacobian = &dynamics.frame(point.frame()).jacobian;
             let wrench = jacobian.fixed_view::<3, 6>(0, 0).transpose();
             from_forces.fixed_columns_mut::<3>(3 * slot).copy_from(&factor.solve(&wrench));
         }
@@ -222,11 +223,11 @@ impl TorsoBalance {
 }
 
 /// J_cᵀ f_r: the forces that the ground's forces make on torso and joints.
-fn ground_load(dynamics: &Dynamics, force: &[Vector3<f64>; 4]) -> Motion {
+fn ground_load(dynamics: &Dynamics, force: &[Vector3<f64>; ContactPoint::COUNT]) -> Motion {
     let mut load = Motion::zeros();
-    for leg in Leg::ALL {
-        let jacobian = &dynamics.frame(Frame::Foot(leg)).jacobian;
-        load += jacobian.fixed_rows::<3>(0).tr_mul(&force[leg.index()]);
+    for point in ContactPoint::ALL {
+        let jacobian = &dynamics.frame(point.frame()).jacobian;
+        load += jacobian.fixed_rows::<3>(0).tr_mul(&force[point.index()]);
     }
     load
 }
@@ -244,7 +245,11 @@ impl ForceSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dynamics::State, joints::JointVector, wbc::WbcSettings};
+    use crate::{
+        dynamics::State,
+        joints::{JointVector, Leg},
+        wbc::WbcSettings,
+    };
 
     #[test]
     fn when_no_solver_finds_forces_the_last_ones_serve_within_their_present_limits() {

@@ -23,7 +23,7 @@ mod stops;
 mod task;
 mod tracking;
 
-pub use contact::ContactSet;
+pub use contact::{ContactPoint, ContactSet};
 pub use controller::{StepPart, Tracked, WholeBodyController};
 pub use objective::{Objective, ObjectiveKind, PointReference, RotationReference};
 pub use output::WbcOutput;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector3, Vector6};
 
-use super::WbcStatus;
+use super::{ContactPoint, WbcStatus};
 use crate::{
     joints::{JOINTS, JointVector},
     model::Model,
@@ -17,8 +17,8 @@ pub struct WbcOutput {
     pub velocity: JointVector,
     /// Feed-forward torques, N m; inside the joints' limits.
     pub torque: JointVector,
-    /// f_r: force of the ground on each foot in the world, N; zero without contact.
-    pub foot_force: [Vector3<f64>; 4],
+    /// f_r: force of the ground on each point in the world, N; zero without contact.
+    pub contact_force: [Vector3<f64>; ContactPoint::COUNT],
     /// δ_t: what the contact forces cannot give of the torso's acceleration, in the torso's frame.
     pub torso_slack: Vector6<f64>,
     /// What was limited, and what failed.
@@ -32,7 +32,7 @@ impl WbcOutput {
             position,
             velocity: JointVector::zeros(),
             torque: JointVector::zeros(),
-            foot_force: [Vector3::zeros(); 4],
+            contact_force: [Vector3::zeros(); ContactPoint::COUNT],
             torso_slack: Vector6::zeros(),
             status: WbcStatus::default(),
         }

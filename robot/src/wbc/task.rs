@@ -2,10 +2,10 @@
 
 use nalgebra::{Vector3, Vector6};
 
-use super::{Gains, hierarchy::Rows};
+use super::{ContactPoint, ContactSet, Gains, hierarchy::Rows};
 use crate::{
     dynamics::{DOF, Dynamics, FrameMotion},
-    joints::Leg,
+    joints::{Leg, Side},
     model::Frame,
 };
 
@@ -23,8 +23,14 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// A foot on the ground: it neither moves nor accelerates, so J_c q̈ = -J̇_c q̇.
-    pub(super) fn contact(dynamics: &Dynamics, leg: Leg) -> Self {
+    /// What stands on the ground: it neither moves nor accelerates, so J_c q̈ = -J̇_c q̇.
+    pub(super) fn contacts(dynamics: &Dynamics, contacts: &ContactSet) -> impl Iterator<Item = Self> {
+        let knees = contacts.points().any(|point| matches!(point, ContactPoint::Knee(_)));
+        let feet = contacts.legs().map(|leg| Self::foot(dynamics, leg));
+        feet.chain(knees.then(|| Self::knees(dynamics)))
+    }
+
+    fn foot(dynamics: &Dynamics, leg: Leg) -> Self {
         let foot = dynamics.frame(Frame::Foot(leg));
         Self {
             rows: rows(foot, 0),
@@ -32,6 +38,25 @@ impl Task {
             velocity: Vector3::zeros(),
             acceleration: -linear(&foot.bias_acceleration),
         }
+    }
+
+    /// Both knees keep their mean height, one row. Were each of them held in all directions, two shanks that are not
+    /// exactly parallel would hold the hips fast, which nothing real does.
+    fn knees(dynamics: &Dynamics) -> Self {
+        let mut knees = Self {
+            rows: [[0.0; DOF]; 3],
+            error: Vector3::zeros(),
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+        };
+        for side in Side::ALL {
+            let knee = dynamics.frame(Frame::Knee(side));
+            for (entry, of_knee) in knees.rows[0].iter_mut().zip(&rows(knee, 0)[2]) {
+                *entry += 0.5 * of_knee;
+            }
+            knees.acceleration.x -= 0.5 * knee.bias_acceleration.z;
+        }
+        knees
     }
 
     /// The torso's step, velocity and acceleration in its own frame, linear and angular.

@@ -257,7 +257,7 @@ impl World {
         name.unwrap_or_default().to_owned()
     }
 
-    /// Whether the trunk touches the ground or is tilted beyond 60 degrees.
+    /// Whether the trunk touches the ground, or is tilted beyond 60 degrees without its nose being up.
     pub fn fallen(&self) -> bool {
         const COS_60_DEG: f64 = 0.5;
         let touches = self.data.contact().iter().any(|contact| {
@@ -265,7 +265,9 @@ impl World {
             let [a, b] = contact.geom;
             (self.is_ground(a) && is_trunk(b)) || (self.is_ground(b) && is_trunk(a))
         });
-        touches || (self.attitude() * Vector3::z()).z < COS_60_DEG
+        let attitude = self.attitude();
+        let sits = (attitude * Vector3::x()).z > COS_60_DEG;
+        touches || (!sits && (attitude * Vector3::z()).z < COS_60_DEG)
     }
 
     /// Whether every state is a number: false when the physics blew up.

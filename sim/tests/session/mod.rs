@@ -82,9 +82,10 @@ impl Session {
         if std::env::var_os("TRACE").is_some() && self.time_ns.is_multiple_of(100_000_000) {
             let s = self.snapshot();
             println!(
-                "{:6.2} {:?} q {:.2?} foot {:.3?} z {:.4} tilt {:.4} force {:.1?} est {:.4?} sev {:?} ff {}",
+                "{:6.2} {:?} slips {} q {:.2?} foot {:.3?} z {:.4} tilt {:.4} force {:.1?} est {:.4?} sev {:?} ff {}",
                 self.time_ns as f64 * 1e-9,
                 s.phase,
+                s.slips,
                 [0, 1, 2, 12, 13, 14].map(|i| s.joint_position[i]),
                 self.truth.feet_in_world[0].coords.as_slice(),
                 self.truth.world_from_torso.translation.z,

@@ -6,7 +6,7 @@
 //! and it takes a microsecond; torques are looked at when all feet are within their pyramids. It is trusted
 //! only if its result proves the optimality conditions; otherwise the interior-point method decides.
 
-use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES, ROWS_PER_FOOT};
+use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES, ROWS_PER_POINT};
 
 /// A constraint counts as violated beyond this, in body weights (1.3 µN for this robot).
 const FEASIBILITY: f64 = 1e-8;
@@ -113,10 +113,10 @@ impl ActiveSet {
         result
     }
 
-    /// The constraint that is furthest outside: of the feet's, else of the torques'.
+    /// The constraint that is furthest outside: of the points', else of the torques'.
     fn most_violated(&self, problem: &ForceProblem, forces: &Forces) -> Option<usize> {
         let mut worst = Worst { members: self.members, slack: -FEASIBILITY, index: None };
-        for (foot, force) in forces.as_chunks::<3>().0.iter().enumerate().take(problem.feet) {
+        for (point, force) in forces.as_chunks::<3>().0.iter().enumerate().take(problem.points) {
             let [x, y, z] = *force;
             let side = problem.friction * z;
             let slacks = [
@@ -124,16 +124,16 @@ impl ActiveSet {
                 side + x,
                 side - y,
                 side + y,
-                z - problem.min_vertical[foot],
-                problem.max_vertical[foot] - z,
+                z - problem.min_vertical[point],
+                problem.max_vertical[point] - z,
             ];
-            worst.consider(ROWS_PER_FOOT * foot, &slacks);
+            worst.consider(ROWS_PER_POINT * point, &slacks);
         }
         if worst.index.is_none() {
             for joint in 0..problem.torque.joints {
                 let torque = problem.torque.torque(joint, forces);
                 let slacks = [torque - problem.torque.lower[joint], problem.torque.upper[joint] - torque];
-                worst.consider(problem.foot_rows() + 2 * joint, &slacks);
+                worst.consider(problem.point_rows() + 2 * joint, &slacks);
             }
         }
         worst.index

@@ -1,6 +1,6 @@
 //! Clarabel behind the active set: slower, but it decides every problem.
 //!
-//! One solver for each number of feet, with and without torque limits, set up once and updated in place,
+//! One solver for each number of points and legs, with and without torque limits, set up once and updated in place,
 //! which needs a stored dense pattern and no presolve. The torque limits are left out first: forces that
 //! satisfy them all the same are optimal with them too. There is no time limit, because Clarabel's clock runs
 //! on over updates; the cap on iterations bounds the time instead. A solve allocates a little inside
@@ -17,13 +17,13 @@ use clarabel::{
     solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus},
 };
 
-use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES};
+use super::{ForceFailure, ForceProblem, ForceSolver, Forces, MAX_FORCES, MAX_POINTS, MAX_TORQUES};
 
-/// What the rows of the feet are multiplied with: slacks are then about 1, where Clarabel starts from. This and
+/// What the rows of the points are multiplied with: slacks are then about 1, where Clarabel starts from. This and
 /// the next two save a third of the iterations.
-const FOOT_SCALE: f64 = 3.0;
+const POINT_SCALE: f64 = 3.0;
 /// What the rows of the torques are multiplied with, 1/m: a torque is a force on a lever of a tenth of a metre.
-const TORQUE_SCALE: f64 = 10.0 * FOOT_SCALE;
+const TORQUE_SCALE: f64 = 10.0 * POINT_SCALE;
 /// What the cost is multiplied with, so that multipliers are about 1.
 const COST_SCALE: f64 = 3000.0;
 /// Of the duality gap of the scaled cost. A gap ε of the cost itself leaves the forces uncertain by √(2ε / Q_1),
@@ -36,6 +36,9 @@ const SWIFT: Pace = Pace { step: 0.999, iterations: 20 };
 /// How the second attempt goes.
 const CAUTIOUS: Pace = Pace { step: 0.9, iterations: 50 };
 
+/// Most legs with torque limits.
+const LEGS: usize = MAX_TORQUES / 3;
+
 /// How far and how often Clarabel may step.
 struct Pace {
     /// Share of the way to the constraints that a step may go.
@@ -44,11 +47,12 @@ struct Pace {
     iterations: u32,
 }
 
-/// The interior-point method, ready for one to four feet.
+/// The interior-point method, ready for all that may stand on the ground.
 pub struct InteriorPoint {
-    /// For one, two, three and four feet; nothing if Clarabel refused its setup.
-    feet_alone: [Option<Prepared>; 4],
-    with_torques: [Option<Prepared>; 4],
+    /// For one point, two, and so on; nothing if Clarabel refused its setup.
+    points_alone: [Option<Prepared>; MAX_POINTS],
+    /// The same, and then for one leg, two, and so on; nothing too where legs and points do not fit.
+    with_torques: [[Option<Prepared>; LEGS]; MAX_POINTS],
 }
 
 /// A solver, and the numbers that it gets before each solve.
@@ -67,15 +71,23 @@ struct Prepared {
 impl InteriorPoint {
     /// Sets up all solvers for a friction coefficient.
     pub fn new(friction: f64) -> Self {
-        let set_up = |joints: usize| {
-            std::array::from_fn(|index| {
-                let mut pattern = ForceProblem::new(friction);
-                pattern.feet = index + 1;
-                pattern.torque.joints = joints * pattern.feet;
-                Prepared::new(&pattern)
-            })
+        let set_up = |points: usize, legs: usize| {
+            let mut pattern = ForceProblem::new(friction);
+            (pattern.points, pattern.torque.joints) = (points, 3 * legs);
+            Prepared::new(&pattern)
         };
-        Self { feet_alone: set_up(0), with_torques: set_up(3) }
+        // A foot for each leg, and at most two knees.
+        let fit = |points: usize, legs: usize| (legs..=legs + 2).contains(&points);
+        Self {
+            points_alone: std::array::from_fn(|index| set_up(index + 1, 0)),
+            with_torques: std::array::from_fn(|index| {
+                let points = index + 1;
+                std::array::from_fn(|index| {
+                    let legs = index + 1;
+                    if fit(points, legs) { set_up(points, legs) } else { None }
+                })
+            }),
+        }
     }
 }
 
@@ -84,17 +96,22 @@ impl ForceSolver for InteriorPoint {
         if !problem.is_finite() {
             return Err(ForceFailure::NotFinite);
         }
-        let Some(index) = problem.feet.checked_sub(1) else { return Err(ForceFailure::Numerical) };
-        let [Some(Some(feet_alone)), Some(Some(with_torques))] =
-            [self.feet_alone.get_mut(index), self.with_torques.get_mut(index)]
-        else {
+        let points = problem.points.wrapping_sub(1);
+        let Some(Some(points_alone)) = self.points_alone.get_mut(points) else {
             return Err(ForceFailure::Numerical);
         };
-        feet_alone.solve(problem, forces)?;
+        points_alone.solve(problem, forces)?;
         let torque = &problem.torque;
         let within = (0..torque.joints)
             .all(|joint| (torque.lower[joint]..=torque.upper[joint]).contains(&torque.torque(joint, forces)));
-        if within { Ok(()) } else { with_torques.solve(problem, forces) }
+        if within {
+            return Ok(());
+        }
+        let legs = (torque.joints / 3).wrapping_sub(1);
+        match self.with_torques.get_mut(points).and_then(|of| of.get_mut(legs)) {
+            Some(Some(with_torques)) => with_torques.solve(problem, forces),
+            _ => Err(ForceFailure::Numerical),
+        }
     }
 }
 
@@ -113,10 +130,10 @@ impl Prepared {
         let mut constraints = (Vec::new(), Vec::new(), Vec::new());
         for row in 0..pattern.rows() {
             for (column, entry) in pattern.normal(row).into_iter().enumerate().take(n) {
-                if entry != 0.0 || row >= pattern.foot_rows() {
+                if entry != 0.0 || row >= pattern.point_rows() {
                     constraints.0.push(row);
                     constraints.1.push(column);
-                    constraints.2.push(-FOOT_SCALE * entry);
+                    constraints.2.push(-POINT_SCALE * entry);
                 }
             }
         }
@@ -168,10 +185,10 @@ impl Prepared {
         }
         // Clarabel's rows are -W f + s = -bound with s >= 0.
         for (index, bound) in self.bounds.iter_mut().enumerate() {
-            let scale = if index < problem.foot_rows() { FOOT_SCALE } else { TORQUE_SCALE };
+            let scale = if index < problem.point_rows() { POINT_SCALE } else { TORQUE_SCALE };
             *bound = -scale * problem.bound(index);
         }
-        let torques = self.bounds.len() - problem.foot_rows();
+        let torques = self.bounds.len() - problem.point_rows();
         let updated = self.solver.update_P(&self.hessian).is_ok()
             && self.solver.update_q(&self.gradient).is_ok()
             && self.solver.update_b(&self.bounds).is_ok()

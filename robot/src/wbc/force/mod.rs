@@ -11,7 +11,7 @@
 //! min  fᵀ Q_1 f + (B f - d)ᵀ Q_2 (B f - d)
 //! s.t. |f_x|, |f_y| <= µ f_z,   f_min <= f_z <= f_max,   τ_min <= τ_0 + T f <= τ_max
 //! ```
-//! over the 3n forces of n feet. The torques of the loaded legs' joints are affine in the forces: with
+//! over the 3n forces of n points. The torques of the loaded legs' joints are affine in the forces: with
 //! τ = A (q̈ + δ_t) + b + g - J_cᵀ f, τ_0 is the torque without forces and T = A_jt B - J_cjᵀ.
 //!
 //! Forces and d are in units of the robot's weight, torques in body weights times a metre: solvers stop at
@@ -26,28 +26,32 @@ pub use interior_point::InteriorPoint;
 
 use super::ForceFailure;
 
-/// Most unknowns: three for each foot. As many joints have torque limits.
-pub const MAX_FORCES: usize = 12;
-/// Constraints of each foot's force.
-pub const ROWS_PER_FOOT: usize = 6;
-/// Forces of the feet in contact, three for each foot, in body weights.
+/// Most points of contact: four feet, two knees.
+pub const MAX_POINTS: usize = 6;
+/// Most unknowns: three for each point.
+pub const MAX_FORCES: usize = 3 * MAX_POINTS;
+/// Most joints with torque limits: those of four legs.
+pub const MAX_TORQUES: usize = 12;
+/// Constraints of each point's force.
+pub const ROWS_PER_POINT: usize = 6;
+/// Forces of the points in contact, three for each point, in body weights.
 pub type Forces = [f64; MAX_FORCES];
 
 /// min ½ fᵀ H f + hᵀ f within pyramids and torque limits; entries beyond 3 `feet` are not used.
 #[derive(Debug, Clone)]
 pub struct ForceProblem {
-    /// How many feet stand on the ground.
-    pub feet: usize,
+    /// How many points stand on the ground.
+    pub points: usize,
     /// H = Q_1 + Bᵀ Q_2 B, symmetric and positive definite.
     pub hessian: [[f64; MAX_FORCES]; MAX_FORCES],
     /// h = -Bᵀ Q_2 d.
     pub gradient: Forces,
     /// µ
     pub friction: f64,
-    /// Least vertical force of each foot.
-    pub min_vertical: [f64; 4],
-    /// Greatest vertical force of each foot.
-    pub max_vertical: [f64; 4],
+    /// Least vertical force of each point.
+    pub min_vertical: [f64; MAX_POINTS],
+    /// Greatest vertical force of each point.
+    pub max_vertical: [f64; MAX_POINTS],
     /// Torque limits of the loaded legs.
     pub torque: TorqueLimits,
 }
@@ -55,14 +59,14 @@ pub struct ForceProblem {
 /// lower <= T f <= upper for some joints.
 #[derive(Debug, Clone)]
 pub struct TorqueLimits {
-    /// How many joints: three for each foot, or none.
+    /// How many joints: three for each leg that stands, or none.
     pub joints: usize,
     /// T, a row for each joint, m.
-    pub from_forces: [[f64; MAX_FORCES]; MAX_FORCES],
+    pub from_forces: [[f64; MAX_FORCES]; MAX_TORQUES],
     /// τ_min - τ_0, body weights times a metre.
-    pub lower: [f64; MAX_FORCES],
+    pub lower: [f64; MAX_TORQUES],
     /// τ_max - τ_0, body weights times a metre.
-    pub upper: [f64; MAX_FORCES],
+    pub upper: [f64; MAX_TORQUES],
 }
 
 /// Finds the forces.
@@ -72,57 +76,57 @@ pub trait ForceSolver {
 }
 
 impl ForceProblem {
-    /// Of no feet.
+    /// Of no points.
     pub const fn new(friction: f64) -> Self {
         Self {
-            feet: 0,
+            points: 0,
             hessian: [[0.0; MAX_FORCES]; MAX_FORCES],
             gradient: [0.0; MAX_FORCES],
             friction,
-            min_vertical: [0.0; 4],
-            max_vertical: [0.0; 4],
+            min_vertical: [0.0; MAX_POINTS],
+            max_vertical: [0.0; MAX_POINTS],
             torque: TorqueLimits::NONE,
         }
     }
 
     /// Number of unknowns.
     pub const fn unknowns(&self) -> usize {
-        3 * self.feet
+        3 * self.points
     }
 
-    /// Number of constraints on single feet; those on torques follow.
-    pub const fn foot_rows(&self) -> usize {
-        ROWS_PER_FOOT * self.feet
+    /// Number of constraints on single points; those on torques follow.
+    pub const fn point_rows(&self) -> usize {
+        ROWS_PER_POINT * self.points
     }
 
     /// Number of constraints.
     pub const fn rows(&self) -> usize {
-        self.foot_rows() + 2 * self.torque.joints
+        self.point_rows() + 2 * self.torque.joints
     }
 
     /// Right-hand side of a constraint n · f >= bound.
     ///
-    /// First come, foot by foot, the four sides of the pyramid, least and greatest vertical force; then,
+    /// First come, point by point, the four sides of the pyramid, least and greatest vertical force; then,
     /// joint by joint, least and greatest torque.
     pub fn bound(&self, index: usize) -> f64 {
-        if index < self.foot_rows() {
-            let foot = index / ROWS_PER_FOOT;
-            return match index % ROWS_PER_FOOT {
-                4 => self.min_vertical[foot],
-                5 => -self.max_vertical[foot],
+        if index < self.point_rows() {
+            let point = index / ROWS_PER_POINT;
+            return match index % ROWS_PER_POINT {
+                4 => self.min_vertical[point],
+                5 => -self.max_vertical[point],
                 _ => 0.0,
             };
         }
-        let row = index - self.foot_rows();
+        let row = index - self.point_rows();
         if row.is_multiple_of(2) { self.torque.lower[row / 2] } else { -self.torque.upper[row / 2] }
     }
 
     /// n of a constraint.
     pub fn normal(&self, index: usize) -> Forces {
         let mut normal = [0.0; MAX_FORCES];
-        if index < self.foot_rows() {
+        if index < self.point_rows() {
             let mu = self.friction;
-            let own = match index % ROWS_PER_FOOT {
+            let own = match index % ROWS_PER_POINT {
                 0 => [-1.0, 0.0, mu],
                 1 => [1.0, 0.0, mu],
                 2 => [0.0, -1.0, mu],
@@ -130,11 +134,11 @@ impl ForceProblem {
                 4 => [0.0, 0.0, 1.0],
                 _ => [0.0, 0.0, -1.0],
             };
-            let foot = index / ROWS_PER_FOOT;
-            normal[3 * foot..3 * foot + 3].copy_from_slice(&own);
+            let point = index / ROWS_PER_POINT;
+            normal[3 * point..3 * point + 3].copy_from_slice(&own);
             return normal;
         }
-        let row = index - self.foot_rows();
+        let row = index - self.point_rows();
         let sign = if row.is_multiple_of(2) { 1.0 } else { -1.0 };
         for (entry, from) in normal.iter_mut().zip(&self.torque.from_forces[row / 2][..self.unknowns()]) {
             *entry = sign * from;
@@ -175,9 +179,9 @@ impl TorqueLimits {
     /// Of no joints.
     pub const NONE: Self = Self {
         joints: 0,
-        from_forces: [[0.0; MAX_FORCES]; MAX_FORCES],
-        lower: [0.0; MAX_FORCES],
-        upper: [0.0; MAX_FORCES],
+        from_forces: [[0.0; MAX_FORCES]; MAX_TORQUES],
+        lower: [0.0; MAX_TORQUES],
+        upper: [0.0; MAX_TORQUES],
     };
 
     /// T f of a joint.

@@ -1,0 +1,201 @@
+//! The way from four feet to sitting upright on the shanks of the rear legs, planned from the model alone.
+//!
+//! ```text
+//!      stand                touch               kneel                upright
+//!    ___________         ___________          ___________               /|
+//!    |\       |\          \\        \            /       \___          | |__
+//!    |/       |/         __\\_______ \         _/___         \___     _|__ ``
+//! ```
+//! Seen from the side, in the *ground's frame* (origin between the centres of the rear feet, x forward, z up): with the
+//! shanks on the ground the knees rest behind the feet, the hips are on a circle about the knees, and the pose of the torso
+//! is that of the hips and a pitch. The feet stay where they stand. What decides is the centre of mass: while the front
+//! feet still carry, the level torso goes back over the shanks (from "touch" to "kneel") until all of the weight is between
+//! knees and feet; only then it rises. So the whole way can be gone slowly, stopped and turned round at any place, which a
+//! sit-up that swings cannot.
+//!
+//! From "kneel" to "upright" the hips go forward as cos θ, for the torso's own centre of mass comes back as cos θ too: what
+//! carries stays between knees and feet all the way.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use crate::{
+    joints::{JointVector, Leg, Side},
+    kinematics::{leg_towards, of_leg},
+    model::{FOOT_RADIUS_M, KNEE_RADIUS_M, Model},
+    modes::{
+        scene::Scene,
+        settings::{PoseSettings, UprightSettings},
+        shift::centre_of_mass,
+    },
+};
+
+/// Places on the way, in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Node {
+    /// On four feet.
+    Stand,
+    /// On four feet, the knees of the rear legs touch the ground.
+    Touch,
+    /// On rear feet and knees, the front feet still on the ground without a load.
+    Kneel,
+    /// On rear feet and knees, the torso upright.
+    Upright,
+}
+
+/// Share of the rise after which the front limbs leave the posture in which they stood: until then the torso lifts them.
+const LIMBS_AFTER: f64 = 0.5;
+/// Each round leaves about a tenth of what lacks.
+const ROUNDS: usize = 6;
+
+/// Torso in the ground's frame, seen from the side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Side2 {
+    x: f64,
+    z: f64,
+    /// Nose up, rad.
+    pitch: f64,
+}
+
+/// The way of one robot on one place.
+#[derive(Debug, Clone, Copy)]
+pub struct Path {
+    world_from_ground: Isometry3<f64>,
+    geometry: Geometry,
+    /// Hips' place behind the rear feet at the three last nodes, m.
+    hips: [f64; 3],
+    upright_rad: f64,
+    stand: Isometry3<f64>,
+    /// Front legs right, left as they stand at [`Node::Kneel`], rad.
+    standing: [Vector3<f64>; 2],
+    /// Front legs and arms right, left at [`Node::Upright`], rad.
+    ready: [Vector3<f64>; 4],
+    stowed: [Vector3<f64>; 2],
+}
+
+/// Lengths of the model, m.
+#[derive(Debug, Clone, Copy)]
+struct Geometry {
+    /// From the torso's origin to the hips, along it.
+    hips_behind: f64,
+    thigh: f64,
+    /// Knees behind and above the centres of the feet.
+    knee: [f64; 2],
+}
+
+impl Geometry {
+    fn of(model: &Model) -> Self {
+        let hip = Leg::RearRight.first_joint();
+        let offset = |joint: usize| model.joints[joint].parent_from_joint.translation.vector;
+        let shank = model.calf_from_foot(Leg::RearRight).translation.vector.norm();
+        let up = KNEE_RADIUS_M - FOOT_RADIUS_M;
+        Self {
+            hips_behind: -(offset(hip) + offset(hip + 1)).x,
+            thigh: offset(hip + 2).z.abs(),
+            knee: [-(shank * shank - up * up).sqrt(), up],
+        }
+    }
+
+    /// The torso with the shanks on the ground; `hips` is in front of the rear feet.
+    fn torso(&self, hips: f64, pitch: f64) -> Side2 {
+        let forward = ((hips - self.knee[0]) / self.thigh).clamp(-1.0, 1.0);
+        let above = self.knee[1] + self.thigh * (1.0 - forward * forward).sqrt();
+        let (sin, cos) = pitch.sin_cos();
+        Side2 { x: hips + self.hips_behind * cos, z: above + self.hips_behind * sin, pitch }
+    }
+}
+
+impl Path {
+    /// For a robot that stands on four feet.
+    pub fn plan(poses: &PoseSettings, settings: &UprightSettings, scene: &Scene<'_>) -> Self {
+        let stand = scene.middle_of_feet(poses.stand_height_m);
+        let rear = (scene.foot(Leg::RearRight) + scene.foot(Leg::RearLeft)) / 2.0;
+        let world_from_ground = Isometry3::from_parts(rear.into(), stand.rotation);
+        let mut path = Self {
+            world_from_ground,
+            geometry: Geometry::of(scene.model),
+            hips: [0.0; 3],
+            upright_rad: settings.pitch_rad,
+            stand,
+            standing: Side::ALL.map(|side| of_leg(scene.desired, side.leg())),
+            ready: [poses.upright_rad, poses.upright_rad, poses.ready(Side::Right), poses.ready(Side::Left)],
+            stowed: Side::ALL.map(|side| poses.stow(side)),
+        };
+        let goals = [settings.touch_com_m, settings.kneel_com_m, settings.upright_com_m];
+        let mut posture = poses.posture(&poses.stand_rad);
+        for (place, (goal, node)) in goals.into_iter().zip([1.0, 2.0, 3.0]).enumerate() {
+            path.hips[place] = goal;
+            for _ in 0..ROUNDS {
+                let com =
+                    path.world_from_ground.inverse_transform_point(&path.com(scene, node, &mut posture));
+                path.hips[place] = path.within_reach(path.hips[place] + goal - com.x);
+            }
+            if node == 2.0 {
+                path.standing = Side::ALL.map(|side| of_leg(&posture, side.leg()));
+            }
+        }
+        path
+    }
+
+    /// The hips are on a circle about the knees.
+    fn within_reach(&self, hips: f64) -> f64 {
+        let Geometry { thigh, knee, .. } = self.geometry;
+        hips.clamp(knee[0] - 0.7 * thigh, knee[0] + 0.9 * thigh)
+    }
+
+    /// Centre of mass in the world at a place of the way, with the joints there.
+    fn com(&self, scene: &Scene<'_>, at: f64, posture: &mut JointVector) -> nalgebra::Point3<f64> {
+        let torso = self.torso(at);
+        let feet = if at > 2.0 { &[Leg::RearRight, Leg::RearLeft][..] } else { &Leg::ALL[..] };
+        for leg in feet {
+            let foot = torso.inverse_transform_point(&scene.foot(*leg).into()).coords;
+            let joints = leg_towards(scene.model, posture, *leg, &foot);
+            posture.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&joints);
+        }
+        for side in Side::ALL {
+            let [leg, arm] = self.limb(side, at);
+            if at > 2.0 {
+                posture.fixed_rows_mut::<3>(side.leg().first_joint()).copy_from(&leg);
+            }
+            posture.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from(&arm);
+        }
+        centre_of_mass(scene.model, &torso, posture).into()
+    }
+
+    /// Where the torso stands on four feet.
+    pub fn stand(&self) -> Isometry3<f64> {
+        self.stand
+    }
+
+    /// Pose of the torso in the world at a place of the way, 1 to 3.
+    pub fn torso(&self, at: f64) -> Isometry3<f64> {
+        let [touch, kneel, upright] = self.hips;
+        let level = (at - 1.0).clamp(0.0, 1.0);
+        let pitch = self.upright_rad * (at - 2.0).clamp(0.0, 1.0);
+        let hips = if pitch > 0.0 {
+            let share = (pitch.cos() - self.upright_rad.cos()) / (1.0 - self.upright_rad.cos());
+            upright + (kneel - upright) * share
+        } else {
+            touch + (kneel - touch) * level
+        };
+        let Side2 { x, z, pitch } = self.geometry.torso(hips, pitch);
+        let nose_up = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -pitch);
+        self.world_from_ground * Isometry3::from_parts(Vector3::new(x, 0.0, z).into(), nose_up)
+    }
+
+    /// Joints of a front leg and its arm at a place of the way.
+    pub fn limb(&self, side: Side, at: f64) -> [Vector3<f64>; 2] {
+        let share = smooth((at - 2.0 - LIMBS_AFTER) / (1.0 - LIMBS_AFTER));
+        let between = |from: &Vector3<f64>, to: &Vector3<f64>| from + (to - from) * share;
+        let place = side.index();
+        [
+            between(&self.standing[place], &self.ready[place]),
+            between(&self.stowed[place], &self.ready[2 + place]),
+        ]
+    }
+}
+
+/// From 0 to 1 without a step in velocity or acceleration.
+fn smooth(share: f64) -> f64 {
+    let s = share.clamp(0.0, 1.0);
+    s * s * s * (10.0 + s * (6.0 * s - 15.0))
+}
