@@ -34,7 +34,7 @@ impl Bimanual {
     pub fn begin(limits: &Limits, setpoint: &mut Setpoint, scene: &Scene<'_>) -> Self {
         let hands = Side::ALL.map(|side| {
             let torso_from_gripper = torso_from_frame(scene.model, scene.desired, Frame::Gripper(side));
-            let gripper = PoseReference::hold(&(setpoint.torso.pose() * torso_from_gripper));
+            let gripper = PoseReference::hold(&(scene.state.world_from_torso * torso_from_gripper));
             Hand {
                 side,
                 gripper: DrivenBody::new(gripper, limits.follower_rad_s, limits.gripper_rate),
@@ -73,7 +73,8 @@ impl Bimanual {
 
     /// One step: within their boxes, within reach. On a detour to another posture foot and arm are led.
     pub fn step(&mut self, played: Option<&Sample>, scene: &Scene<'_>, setpoint: &mut Setpoint) {
-        let world_from_torso = setpoint.torso.pose();
+        // Where it really is: on its shanks it cannot go everywhere, and may be off its reference by millimetres for good.
+        let world_from_torso = scene.state.world_from_torso;
         let ground = Ground::at(scene.ground(&setpoint.contacts), &world_from_torso);
         let range = self.limits.bimanual;
         for Hand { side, gripper, start, reach } in &mut self.hands {

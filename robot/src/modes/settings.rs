@@ -20,8 +20,10 @@ pub struct PoseSettings {
     pub left_ready_rad: Vector3<f64>,
     /// The left arm as it is carried while walking, rad; the right one has joint 2 mirrored.
     pub left_carry_rad: Vector3<f64>,
-    /// Hip, thigh, calf of the front legs of a robot that sits upright, rad; the arms are ready.
-    pub upright_rad: Vector3<f64>,
+    /// Hip, thigh, calf of the left front leg of a robot that sits upright, rad; the right one has the hip mirrored.
+    pub left_upright_leg_rad: Vector3<f64>,
+    /// Its arm, rad; the right one has joint 2 mirrored.
+    pub left_upright_arm_rad: Vector3<f64>,
     /// Torso's origin above the feet's centres in stance, m.
     pub stand_height_m: f64,
     /// How far the torso rises before a foot lifts, m.
@@ -44,7 +46,8 @@ impl Default for PoseSettings {
             left_stow_rad: Vector3::new(-std::f64::consts::PI, 0.05, 0.0),
             left_ready_rad: Vector3::new(-0.1, 0.0, 0.0),
             left_carry_rad: Vector3::new(-2.24, 0.3, 0.0),
-            upright_rad: Vector3::new(0.0, 1.85, -1.95),
+            left_upright_leg_rad: Vector3::new(0.12, 1.6, -1.9),
+            left_upright_arm_rad: Vector3::new(0.3, 0.0, 0.0),
             stand_height_m: 0.265,
             rise_m: 0.04,
             shift_margin_m: 0.07,
@@ -69,6 +72,16 @@ impl PoseSettings {
     /// The posture of an arm that is carried while walking.
     pub fn carry(&self, side: Side) -> Vector3<f64> {
         mirrored(&self.left_carry_rad, side)
+    }
+
+    /// The front leg of a robot that sits upright, and its arm.
+    pub fn upright(&self, side: Side) -> [Vector3<f64>; 2] {
+        let leg = self.left_upright_leg_rad;
+        let leg = match side {
+            Side::Left => leg,
+            Side::Right => Vector3::new(-leg.x, leg.y, leg.z),
+        };
+        [leg, mirrored(&self.left_upright_arm_rad, side)]
     }
 
     /// The posture of the lifted leg's arm in which a mode begins.

@@ -16,12 +16,14 @@
 //! From "kneel" to "upright" the hips go forward as cos θ, for the torso's own centre of mass comes back as cos θ too: what
 //! carries stays between knees and feet all the way.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::{
     joints::{JointVector, Leg, Side},
-    kinematics::{leg_towards, of_leg},
-    model::{FOOT_RADIUS_M, KNEE_RADIUS_M, Model},
+    kinematics::{leg_towards, of_leg, torso_from_frame},
+    model::{FOOT_RADIUS_M, Frame, KNEE_RADIUS_M, Model},
     modes::{
         scene::Scene,
         settings::{PoseSettings, UprightSettings},
@@ -67,8 +69,8 @@ pub struct Path {
     stand: Isometry3<f64>,
     /// Front legs right, left as they stand at [`Node::Kneel`], rad.
     standing: [Vector3<f64>; 2],
-    /// Front legs and arms right, left at [`Node::Upright`], rad.
-    ready: [Vector3<f64>; 4],
+    /// Front leg and arm right, left at [`Node::Upright`], rad.
+    ready: [[Vector3<f64>; 2]; 2],
     stowed: [Vector3<f64>; 2],
 }
 
@@ -108,7 +110,8 @@ impl Path {
     /// For a robot that stands on four feet.
     pub fn plan(poses: &PoseSettings, settings: &UprightSettings, scene: &Scene<'_>) -> Self {
         let stand = scene.middle_of_feet(poses.stand_height_m);
-        let rear = (scene.foot(Leg::RearRight) + scene.foot(Leg::RearLeft)) / 2.0;
+        let rear =
+            (scene.foot(Leg::RearRight) + scene.foot(Leg::RearLeft)) / 2.0 - rolled_back(scene, &stand);
         let world_from_ground = Isometry3::from_parts(rear.into(), stand.rotation);
         let mut path = Self {
             world_from_ground,
@@ -117,7 +120,7 @@ impl Path {
             upright_rad: settings.pitch_rad,
             stand,
             standing: Side::ALL.map(|side| of_leg(scene.desired, side.leg())),
-            ready: [poses.upright_rad, poses.upright_rad, poses.ready(Side::Right), poses.ready(Side::Left)],
+            ready: Side::ALL.map(|side| poses.upright(side)),
             stowed: Side::ALL.map(|side| poses.stow(side)),
         };
         let goals = [settings.touch_com_m, settings.kneel_com_m, settings.upright_com_m];
@@ -188,10 +191,24 @@ impl Path {
         let between = |from: &Vector3<f64>, to: &Vector3<f64>| from + (to - from) * share;
         let place = side.index();
         [
-            between(&self.standing[place], &self.ready[place]),
-            between(&self.stowed[place], &self.ready[2 + place]),
+            between(&self.standing[place], &self.ready[place][0]),
+            between(&self.stowed[place], &self.ready[place][1]),
         ]
     }
+}
+
+/// How far the rear feet roll back, in the world, as their shanks lie down: they are spheres.
+fn rolled_back(scene: &Scene<'_>, stand: &Isometry3<f64>) -> Vector3<f64> {
+    let forward = stand.rotation * Vector3::x();
+    let knee = |side: Side| {
+        let torso_from_knee = torso_from_frame(scene.model, &scene.state.position, Frame::Knee(side));
+        (scene.state.world_from_torso * torso_from_knee).translation.vector
+    };
+    let mean = Side::ALL.map(|side| {
+        let shank = scene.foot(side.rear_leg()) - knee(side);
+        FRAC_PI_2 - shank.dot(&forward).atan2(-shank.z)
+    });
+    forward * (FOOT_RADIUS_M * (mean[0] + mean[1]) / 2.0)
 }
 
 /// From 0 to 1 without a step in velocity or acceleration.
