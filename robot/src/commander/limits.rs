@@ -234,7 +234,7 @@ impl Default for Limits {
                 z: Range { min: -0.15, max: 0.3 },
             },
             bimanual: LimbRange {
-                x: Range { min: -0.25, max: 0.25 },
+                x: Range { min: -0.35, max: 0.25 },
                 outward: Range { min: -0.2, max: 0.3 },
                 z: Range { min: -0.35, max: 0.65 },
             },

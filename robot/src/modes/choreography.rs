@@ -298,6 +298,9 @@ impl Choreography {
             Phase::SitUp => self.sit(Node::Upright, scene),
             Phase::GetUp => self.sit(Node::Stand, scene),
             Phase::Bimanual => {
+                if let Some(upright) = &mut self.upright {
+                    upright.hold(scene, &mut self.setpoint);
+                }
                 self.driving.step(operator, scene, &mut self.setpoint);
                 Progress::on_two_feet(true)
             }

@@ -2,6 +2,7 @@
 //!
 //! To add one: a module with `run`, and a variant of [`Experiment`].
 
+pub mod bimanual;
 pub mod body;
 pub mod demo;
 pub mod drive;
@@ -59,6 +60,8 @@ pub enum Experiment {
     LocoManipulation(loco_manipulation::Args),
     /// From every mode to every other.
     Modes(modes::Args),
+    /// Sitting up, working with both grippers, being pushed, coming down.
+    Bimanual(bimanual::Args),
     /// Walking: pace, pushes, rough ground.
     Walking(walking::Args),
     /// How much more the arms reach than the feet: the paper's table, in several definitions.
@@ -76,6 +79,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::LocoManipulation(of) => loco_manipulation::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Modes(of) => modes::run(configs, of, args.seed)?,
+        Experiment::Bimanual(of) => bimanual::run(configs, of, args.seed)?,
         Experiment::Walking(of) => walking::run(configs, of, args.seed)?,
         Experiment::Workspace => workspace::run(configs, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,

@@ -3,7 +3,7 @@
 //! ```text
 //! push      a wrench on the torso or a gripper for a time     MuJoCo's `xfrc_applied`
 //! load      a mass in a gripper until it is taken out         mass of a body that is welded to the hand
-//! friction  of one foot or all of them until changed          the feet's contacts take the feet's coefficient
+//! friction  of one foot or everything until changed           the contacts take that coefficient
 //! silence   commands are lost for a time                      the last one stays in force, as on the Go1
 //! ```
 //! Each takes effect at the next step; [`SimRobot::reset`](super::SimRobot::reset) ends all of them.
@@ -56,9 +56,9 @@ pub enum Disturbance {
         /// kg.
         mass_kg: f64,
     },
-    /// Coulomb friction between feet and ground.
+    /// Coulomb friction between a foot, or everything, and the ground.
     Friction {
-        /// The foot; none means all four.
+        /// The foot; none means everything.
         foot: Option<Leg>,
         /// Coefficient; rubber on ice has 0.05.
         coefficient: f64,

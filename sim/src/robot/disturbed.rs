@@ -39,12 +39,17 @@ impl World {
         self.disturbed(model)
     }
 
-    /// Friction coefficient between these feet and the ground.
-    pub fn set_friction(&mut self, feet: &[Leg], coefficient: f64) -> Result<(), SimRobotError> {
+    /// Friction coefficient between a foot and the ground.
+    pub fn set_friction(&mut self, foot: Leg, coefficient: f64) -> Result<(), SimRobotError> {
         let mut model = self.data.model().clone();
-        for foot in feet {
-            model.geom_friction_mut()[self.foot_geoms[foot.index()]][0] = coefficient;
-        }
+        model.geom_friction_mut()[self.foot_geoms[foot.index()]][0] = coefficient;
+        self.disturbed(model)
+    }
+
+    /// Friction coefficient of everything on the ground.
+    pub fn set_friction_everywhere(&mut self, coefficient: f64) -> Result<(), SimRobotError> {
+        let mut model = self.data.model().clone();
+        model.geom_friction_mut().iter_mut().for_each(|friction| friction[0] = coefficient);
         self.disturbed(model)
     }
 

@@ -10,7 +10,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use locoman_robot::joints::{JOINTS, JointVector, Leg, Side};
+use locoman_robot::joints::{JOINTS, JointVector, Side};
 use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Sensors};
 use nalgebra::Vector3;
@@ -183,10 +183,10 @@ impl SimRobot {
             }
             Disturbance::Load { side, mass_kg } => self.world.set_load(side, mass_kg)?,
             Disturbance::Friction { foot: Some(leg), coefficient } => {
-                self.world.set_friction(&[leg], coefficient)?;
+                self.world.set_friction(leg, coefficient)?;
             }
             Disturbance::Friction { foot: None, coefficient } => {
-                self.world.set_friction(&Leg::ALL, coefficient)?;
+                self.world.set_friction_everywhere(coefficient)?;
             }
             Disturbance::Silence { duration_s } => self.silent_until = self.step + self.steps(duration_s),
         }

@@ -21,6 +21,8 @@ use crate::{
 
 /// Half the interval of the central differences that give velocities and accelerations, s.
 const STEP_S: f64 = 1e-3;
+/// The path goes with the feet in this time, s: their noise is not followed.
+const FOLLOW_S: f64 = 0.3;
 
 /// A robot on its way up or down, or upright.
 #[derive(Debug, Clone)]
@@ -122,7 +124,14 @@ impl Upright {
             self.head(setpoint);
         }
         self.refer(scene, setpoint);
+        setpoint.kneel();
         self.towards.is_none() && self.at == goal && settled && !waits
+    }
+
+    /// The torso of a robot that is upright, for one step.
+    pub fn hold(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        self.time_s += scene.dt_s;
+        self.refer(scene, setpoint);
     }
 
     fn duration_s(&self) -> f64 {
@@ -157,8 +166,7 @@ impl Upright {
     }
 
     /// Writes the references.
-    fn refer(&self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
-        setpoint.kneel();
+    fn refer(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         let elapsed_s = self.time_s - self.began_s;
         if self.is_on_four_feet() {
             if self.towards.is_some() {
@@ -166,6 +174,7 @@ impl Upright {
             }
             return;
         }
+        self.path.follow(scene, scene.dt_s / FOLLOW_S);
         let times = [elapsed_s - STEP_S, elapsed_s, elapsed_s + STEP_S];
         let at = times.map(|time_s| self.along.sample(time_s.max(0.0)).position.x);
         let torso = at.map(|at| self.path.torso(at));

@@ -164,6 +164,19 @@ impl Path {
         centre_of_mass(scene.model, &torso, posture).into()
     }
 
+    /// Goes with the rear feet where they slide or creep, by a share of the way: what keeps the balance is where the torso
+    /// is above them.
+    pub fn follow(&mut self, scene: &Scene<'_>, share: f64) {
+        let [right, left] = [Leg::RearRight, Leg::RearLeft].map(|leg| scene.foot(leg));
+        let across = left - right;
+        let now = &mut self.world_from_ground;
+        let middle = (right + left) / 2.0 - now.translation.vector;
+        let forward = now.rotation * Vector3::x();
+        let turn = (-across.dot(&forward)).atan2(across.xy().norm());
+        now.translation.vector += share * middle;
+        now.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), share * turn) * now.rotation;
+    }
+
     /// Where the torso stands on four feet.
     pub fn stand(&self) -> Isometry3<f64> {
         self.stand
