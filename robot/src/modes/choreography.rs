@@ -217,7 +217,7 @@ impl Choreography {
             Phase::Bimanual => self.driving.begin_bimanual(&mut self.setpoint, scene),
             Phase::SitDown => {
                 if let Some(upright) = &mut self.upright {
-                    upright.take_up_limbs(&self.motions, scene);
+                    upright.take_up(&self.motions, scene);
                 }
             }
             Phase::Stow(side) => self.begin_stow(side, scene, &stand),

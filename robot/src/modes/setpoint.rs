@@ -22,6 +22,8 @@ pub struct Setpoint {
     pub torso: PoseReference,
     /// Feet in the world.
     feet: [PointReference; 4],
+    /// Joints of legs.
+    legs: [PointReference; 4],
     /// Grippers right, left in the world.
     grippers: [PoseReference; 2],
     /// Joints of the arms right, left.
@@ -51,6 +53,7 @@ impl Setpoint {
             row: &table::STANCE,
             torso: PoseReference::hold(torso),
             feet: [PointReference::hold(Vector3::zeros()); 4],
+            legs: [PointReference::hold(Vector3::zeros()); 4],
             grippers: [PoseReference::hold(torso); 2],
             arms: arms.map(PointReference::hold),
             contacts: table::STANCE.contacts(),
@@ -79,9 +82,14 @@ impl Setpoint {
         self.grippers[side.index()] = gripper;
     }
 
-    /// The robot kneels, or is about to: its front feet, where they are in the air, and its arms are led.
+    /// The robot kneels: joints of the rear legs, of front legs in the air and of the arms are led.
     pub fn kneel(&mut self) {
         self.row = &table::KNEELING;
+    }
+
+    /// The joints of a leg, for when its posture is in force.
+    pub fn hold_leg(&mut self, leg: Leg, posture: PointReference) {
+        self.legs[leg.index()] = posture;
     }
 
     /// Where a foot in the air should be.
@@ -146,13 +154,18 @@ impl Setpoint {
             ObjectiveKind::GripperOrientation(side) => {
                 Objective::GripperOrientation(side, self.grippers[side.index()].rotation)
             }
+            ObjectiveKind::LegPosture(leg) => Objective::LegPosture(leg, self.legs[leg.index()]),
             ObjectiveKind::ArmPosture(side) => Objective::ArmPosture(side, self.arms[side.index()]),
         }
     }
 
-    /// A foot that stands is not moved.
+    /// A foot that stands is not moved, nor the joints of a front leg that does.
     fn is_in_force(&self, kind: ObjectiveKind) -> bool {
-        !matches!(kind, ObjectiveKind::FootPosition(leg) if self.contacts.contains(leg))
+        match kind {
+            ObjectiveKind::FootPosition(leg) => !self.contacts.contains(leg),
+            ObjectiveKind::LegPosture(leg) => leg.side().is_none() || !self.contacts.contains(leg),
+            _ => true,
+        }
     }
 
     /// The row's objectives with their references.

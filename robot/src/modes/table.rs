@@ -11,8 +11,8 @@ use crate::{
         ContactPoint::{self, Foot, Knee},
         ContactSet,
         ObjectiveKind::{
-            self, ArmPosture, FootPosition, GripperOrientation, GripperPosition, TorsoOrientation,
-            TorsoPosition,
+            self, ArmPosture, FootPosition, GripperOrientation, GripperPosition, LegPosture,
+            TorsoOrientation, TorsoPosition,
         },
     },
 };
@@ -135,19 +135,16 @@ pub static LOCO_MANIPULATION: [Row; 3] = [
     },
 ];
 
-/// On the way to sitting upright and back. The orientation comes first: on its shanks the torso has two freedoms, and what
-/// it must not do is lean.
-pub static KNEELING: Row = KNEELING_ROW;
-const KNEELING_ROW: Row = Row {
+/// On the shanks of the rear legs, on the way to sitting upright and back. The joints of these legs are held, and with them
+/// the torso: it has no other freedom there, and where it is does not hang on where the robot believes to be.
+pub static KNEELING: Row = Row {
     mode: Mode::Bimanual,
-    objectives: &[
-        TorsoOrientation,
-        TorsoPosition,
-        FootPosition(Leg::FrontRight),
-        FootPosition(Leg::FrontLeft),
+    objectives: &kneeling([
+        LegPosture(Leg::FrontRight),
+        LegPosture(Leg::FrontLeft),
         ArmPosture(Side::Right),
         ArmPosture(Side::Left),
-    ],
+    ]),
     stance: SHANKS,
 };
 
@@ -155,42 +152,50 @@ const KNEELING_ROW: Row = Row {
 pub static BIMANUAL: [Row; 4] = [
     Row {
         mode: Mode::Bimanual,
-        objectives: &[
-            TorsoOrientation,
-            TorsoPosition,
+        objectives: &kneeling([
             GripperPosition(Side::Right),
             GripperPosition(Side::Left),
             GripperOrientation(Side::Right),
             GripperOrientation(Side::Left),
-        ],
+        ]),
         stance: SHANKS,
     },
     Row {
         mode: Mode::Bimanual,
-        objectives: &[
-            TorsoOrientation,
-            TorsoPosition,
+        objectives: &kneeling([
             FootPosition(Leg::FrontRight),
             GripperPosition(Side::Left),
             GripperOrientation(Side::Left),
             ArmPosture(Side::Right),
-        ],
+        ]),
         stance: SHANKS,
     },
     Row {
         mode: Mode::Bimanual,
-        objectives: &[
-            TorsoOrientation,
-            TorsoPosition,
+        objectives: &kneeling([
             FootPosition(Leg::FrontLeft),
             GripperPosition(Side::Right),
             GripperOrientation(Side::Right),
             ArmPosture(Side::Left),
-        ],
+        ]),
         stance: SHANKS,
     },
-    KNEELING_ROW,
+    Row {
+        mode: Mode::Bimanual,
+        objectives: &kneeling([
+            FootPosition(Leg::FrontRight),
+            FootPosition(Leg::FrontLeft),
+            ArmPosture(Side::Right),
+            ArmPosture(Side::Left),
+        ]),
+        stance: SHANKS,
+    },
 ];
+
+/// The legs on which the robot kneels, and then the front limbs.
+const fn kneeling([first, second, third, fourth]: [ObjectiveKind; 4]) -> [ObjectiveKind; 6] {
+    [LegPosture(Leg::RearRight), LegPosture(Leg::RearLeft), first, second, third, fourth]
+}
 
 /// Torso, feet, and then the arms.
 const fn walking(first: ObjectiveKind, second: ObjectiveKind) -> [ObjectiveKind; MAX_OBJECTIVES] {
@@ -251,7 +256,7 @@ mod tests {
             FootPosition(_) => Some("Foot Position"),
             GripperPosition(_) => Some("Gripper Position"),
             GripperOrientation(_) => Some("Gripper Orientation"),
-            ArmPosture(_) => None,
+            LegPosture(_) | ArmPosture(_) => None,
         }
     }
 
@@ -273,10 +278,8 @@ mod tests {
                 Mode::LocoManipulation(_) => {
                     ("Torso Position | Torso Orientation | Foot Position | Gripper Orientation", 4)
                 }
-                // The torso is not held in the paper's table, but is in its text; feet and knees carry.
-                Mode::Bimanual => {
-                    ("Torso Orientation | Torso Position | Gripper Position | Gripper Orientation", 4)
-                }
+                // Feet and knees carry; the paper has the rear feet.
+                Mode::Bimanual => ("Gripper Position | Gripper Orientation", 4),
                 // Not in the paper's table: where its switchers begin and end.
                 _ => ("Torso Position | Torso Orientation", 4),
             };

@@ -152,6 +152,7 @@ impl WholeBodyController {
         self.count_failures(&reaction, &mut status);
 
         let mut command = self.command(state, &reaction);
+        hold_shanks(&mut command, objectives, contacts);
         command.status = status;
         command.limit(model);
         if command.is_finite() {
@@ -231,6 +232,19 @@ impl WholeBodyController {
         output.contact_force = reaction.force;
         output.torso_slack = reaction.slack;
         output
+    }
+}
+
+/// Legs on which the robot kneels take their posture as it is: were it only what the contacts leave of it, a foot or knee
+/// that has slid would stay where it is.
+fn hold_shanks(command: &mut WbcOutput, objectives: &[Objective], contacts: &ContactSet) {
+    for objective in objectives {
+        if let Objective::LegPosture(leg, reference) = objective
+            && contacts.contains(*leg)
+        {
+            command.position.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&reference.position);
+            command.velocity.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&reference.velocity);
+        }
     }
 }
 

@@ -3,13 +3,13 @@
 //! A list of [`Objective`]s is plain data; what one of them means to the hierarchy, its [`Track`]er knows. A
 //! new kind is a variant here and, where none of the trackers fits, a file beside them.
 
-mod arm_posture;
 mod frame_orientation;
 mod frame_position;
+mod posture;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use self::{arm_posture::ArmPosture, frame_orientation::FrameOrientation, frame_position::FramePosition};
+use self::{frame_orientation::FrameOrientation, frame_position::FramePosition, posture::Posture};
 use super::{Gains, task::Task};
 use crate::{
     dynamics::{Dynamics, State},
@@ -81,6 +81,8 @@ pub enum Objective {
     GripperPosition(Side, PointReference),
     /// A gripper's orientation in the world.
     GripperOrientation(Side, RotationReference),
+    /// The three joints of a leg.
+    LegPosture(Leg, PointReference),
     /// The three joints of an arm. A stowed arm is held so, which no stance leg can feel.
     ArmPosture(Side, PointReference),
 }
@@ -98,6 +100,8 @@ pub enum ObjectiveKind {
     GripperPosition(Side),
     /// See [`Objective::GripperOrientation`].
     GripperOrientation(Side),
+    /// See [`Objective::LegPosture`].
+    LegPosture(Leg),
     /// See [`Objective::ArmPosture`].
     ArmPosture(Side),
 }
@@ -118,6 +122,7 @@ impl Objective {
             Self::FootPosition(leg, _) => ObjectiveKind::FootPosition(*leg),
             Self::GripperPosition(side, _) => ObjectiveKind::GripperPosition(*side),
             Self::GripperOrientation(side, _) => ObjectiveKind::GripperOrientation(*side),
+            Self::LegPosture(leg, _) => ObjectiveKind::LegPosture(*leg),
             Self::ArmPosture(side, _) => ObjectiveKind::ArmPosture(*side),
         }
     }
@@ -125,13 +130,15 @@ impl Objective {
     pub(super) fn task(&self, robot: &Robot<'_>, gains: &Gains) -> Option<Task> {
         let point = |frame, reference| FramePosition { frame, reference }.task(robot, gains);
         let rotation = |frame, reference| FrameOrientation { frame, reference }.task(robot, gains);
+        let posture = |first, reference| Posture { first, reference }.task(robot, gains);
         let task = match self {
             Self::TorsoPosition(reference) => point(Frame::Torso, reference),
             Self::TorsoOrientation(reference) => rotation(Frame::Torso, reference),
             Self::FootPosition(leg, reference) => point(Frame::Foot(*leg), reference),
             Self::GripperPosition(side, reference) => point(Frame::Gripper(*side), reference),
             Self::GripperOrientation(side, reference) => rotation(Frame::Gripper(*side), reference),
-            Self::ArmPosture(side, reference) => ArmPosture { side: *side, reference }.task(robot, gains),
+            Self::LegPosture(leg, reference) => posture(leg.first_joint(), reference),
+            Self::ArmPosture(side, reference) => posture(side.first_arm_joint(), reference),
         };
         task.is_finite().then_some(task)
     }

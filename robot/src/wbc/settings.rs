@@ -45,6 +45,8 @@ pub struct ObjectiveGains {
     pub gripper_position: Gains,
     /// Gripper orientation.
     pub gripper_orientation: Gains,
+    /// Posture of a leg.
+    pub leg_posture: Gains,
     /// Posture of an arm.
     pub arm_posture: Gains,
 }
@@ -58,6 +60,7 @@ impl ObjectiveGains {
             ObjectiveKind::FootPosition(_) => &self.foot_position,
             ObjectiveKind::GripperPosition(_) => &self.gripper_position,
             ObjectiveKind::GripperOrientation(_) => &self.gripper_orientation,
+            ObjectiveKind::LegPosture(_) => &self.leg_posture,
             ObjectiveKind::ArmPosture(_) => &self.arm_posture,
         }
     }
@@ -194,6 +197,7 @@ impl Default for WbcSettings {
                 foot_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_position: gains(100.0, 10.0, 0.05, 20.0, 0.02),
                 gripper_orientation: gains(100.0, 10.0, 0.3, 30.0, 0.05),
+                leg_posture: gains(100.0, 10.0, 0.3, 30.0, 0.05),
                 arm_posture: gains(100.0, 10.0, 0.3, 30.0, 0.05),
             },
             contact: ContactForceSettings {
@@ -258,6 +262,7 @@ impl WbcSettings {
             ("objectives.foot_position", &objectives.foot_position),
             ("objectives.gripper_position", &objectives.gripper_position),
             ("objectives.gripper_orientation", &objectives.gripper_orientation),
+            ("objectives.leg_posture", &objectives.leg_posture),
             ("objectives.arm_posture", &objectives.arm_posture),
             ("walking.torso_position", &self.walking.torso_position),
             ("walking.torso_orientation", &self.walking.torso_orientation),

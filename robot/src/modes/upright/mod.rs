@@ -13,10 +13,8 @@ use super::{
 };
 use crate::{
     commander::{PointMotion, PoseMotion, PoseReference},
-    joints::{JointVector, Side},
-    kinematics::torso_from_frame,
-    model::Frame,
-    wbc::{ContactPoint, ContactSet, PointReference, RotationReference},
+    joints::{JointVector, Leg, Side},
+    wbc::{ContactPoint, ContactSet, PointReference},
 };
 
 /// Half the interval of the central differences that give velocities and accelerations, s.
@@ -39,15 +37,15 @@ pub struct Upright {
     along: PointMotion,
     /// Between [`Node::Stand`] and [`Node::Touch`].
     torso: PoseMotion,
-    /// What front legs and arms right, left are off the path, rad: it fades out.
-    offsets: [PointMotion; 4],
-    offsets_began_s: f64,
+    /// What the joints are off the path, rad, of which a share remains, in the first coordinate of `fades`.
+    offset: JointVector,
+    fades: PointMotion,
+    fades_from_s: f64,
 }
 
 impl Upright {
     /// Begins on four feet.
     pub fn begin(path: Path, settings: UprightSettings, setpoint: &Setpoint) -> Self {
-        let nothing = PointMotion::hold(Vector3::zeros());
         Self {
             settings,
             path,
@@ -57,29 +55,24 @@ impl Upright {
             began_s: 0.0,
             along: PointMotion::hold(Vector3::x() * place(Node::Touch)),
             torso: PoseMotion::new(&setpoint.torso, &setpoint.torso.pose(), 1.0),
-            offsets: [nothing; 4],
-            offsets_began_s: 0.0,
+            offset: JointVector::zeros(),
+            fades: PointMotion::hold(Vector3::zeros()),
+            fades_from_s: 0.0,
         }
     }
 
-    /// Takes up the front limbs as the joints hold them, wherever the operator has led them.
-    pub fn take_up_limbs(&mut self, motions: &MotionSettings, scene: &Scene<'_>) {
-        let at = self.along.sample(self.time_s - self.began_s).position.x;
-        let mut longest: f64 = 0.0;
-        let mut offset = |held: Vector3<f64>, planned: Vector3<f64>| {
-            let offset = held - planned;
-            longest = longest.max(offset.amax());
-            offset
-        };
-        let [right, left] = Side::ALL.map(|side| {
-            let [leg, arm] = self.path.limb(side, at);
-            let held = crate::kinematics::of_leg(scene.desired, side.leg());
-            [offset(held, leg), offset(scene.desired_arm(side), arm)]
-        });
-        let duration_s = (longest / motions.leg_rad_s).max(motions.torso_s);
-        self.offsets = [right[0], left[0], right[1], left[1]]
-            .map(|offset| PointMotion::new(&PointReference::hold(offset), &Vector3::zeros(), duration_s));
-        self.offsets_began_s = self.time_s;
+    /// Takes up the joints as they are held, wherever an operator has led them.
+    pub fn take_up(&mut self, motions: &MotionSettings, scene: &Scene<'_>) {
+        self.offset = scene.desired - self.path.joints(self.place(self.time_s));
+        let duration_s = (self.offset.amax() / motions.leg_rad_s).max(motions.torso_s);
+        let whole = PointReference::hold(Vector3::x());
+        self.fades = PointMotion::new(&whole, &Vector3::zeros(), duration_s);
+        self.fades_from_s = self.time_s;
+    }
+
+    /// Where it is on the path at some time.
+    fn place(&self, time_s: f64) -> f64 {
+        self.along.sample((time_s - self.began_s).max(0.0)).position.x
     }
 
     /// One step towards a node. Returns whether it is there, on what should carry it.
@@ -100,6 +93,9 @@ impl Upright {
                 self.head(setpoint);
             } else if elapsed_s >= self.duration_s() {
                 (self.at, self.towards) = (to, None);
+                if self.at == Node::Touch {
+                    self.take_up(motions, scene);
+                }
             }
         }
         let next = match self.towards {
@@ -114,8 +110,7 @@ impl Upright {
                 settled = load(setpoint, &wanted, scene.dt_s / motions.load_s);
             }
         }
-        let waits =
-            self.time_s - self.offsets_began_s < self.offsets[0].duration_s() && self.at == Node::Upright;
+        let waits = self.time_s - self.fades_from_s < self.fades.duration_s() && self.at == Node::Upright;
         if let Some(next) = next
             && settled
             && !waits
@@ -124,7 +119,6 @@ impl Upright {
             self.head(setpoint);
         }
         self.refer(scene, setpoint);
-        setpoint.kneel();
         self.towards.is_none() && self.at == goal && settled && !waits
     }
 
@@ -169,46 +163,26 @@ impl Upright {
     fn refer(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
         let elapsed_s = self.time_s - self.began_s;
         if self.is_on_four_feet() {
+            setpoint.stand();
             if self.towards.is_some() {
                 setpoint.torso = self.torso.sample(elapsed_s);
             }
             return;
         }
+        setpoint.kneel();
         self.path.follow(scene, scene.dt_s / FOLLOW_S);
-        let times = [elapsed_s - STEP_S, elapsed_s, elapsed_s + STEP_S];
-        let at = times.map(|time_s| self.along.sample(time_s.max(0.0)).position.x);
-        let torso = at.map(|at| self.path.torso(at));
-        let point = differences(torso.map(|torso| torso.translation.vector));
-        let rates = [0, 1].map(|first| {
-            (torso[first + 1].rotation * torso[first].rotation.inverse()).scaled_axis() / STEP_S
+        setpoint.torso = PoseReference::hold(&self.path.torso(self.place(self.time_s)));
+        let joints = [-STEP_S, 0.0, STEP_S].map(|later_s| {
+            let time_s = self.time_s + later_s;
+            let left = self.fades.sample((time_s - self.fades_from_s).max(0.0)).position.x;
+            self.path.joints(self.place(time_s)) + self.offset * left
         });
-        setpoint.torso = PoseReference {
-            point,
-            rotation: RotationReference {
-                orientation: torso[1].rotation,
-                angular_velocity: (rates[0] + rates[1]) / 2.0,
-                angular_acceleration: (rates[1] - rates[0]) / STEP_S,
-            },
-        };
+        let of = |first: usize| differences(joints.map(|joints| joints.fixed_rows::<3>(first).into_owned()));
+        for leg in Leg::ALL {
+            setpoint.hold_leg(leg, of(leg.first_joint()));
+        }
         for side in Side::ALL {
-            let limb = [0, 1, 2].map(|index| {
-                let faded_s = self.time_s - self.offsets_began_s + times[index] - elapsed_s;
-                let [leg, arm] = self.path.limb(side, at[index]);
-                let place = side.index();
-                [
-                    leg + self.offsets[place].sample(faded_s.max(0.0)).position,
-                    arm + self.offsets[2 + place].sample(faded_s.max(0.0)).position,
-                ]
-            });
-            let feet = [0, 1, 2].map(|index| {
-                let mut joints: JointVector = *scene.desired;
-                joints.fixed_rows_mut::<3>(side.leg().first_joint()).copy_from(&limb[index][0]);
-                (torso[index] * torso_from_frame(scene.model, &joints, Frame::Foot(side.leg())))
-                    .translation
-                    .vector
-            });
-            setpoint.lead_foot(side.leg(), differences(feet));
-            setpoint.hold_arm(side, differences(limb.map(|[_, arm]| arm)));
+            setpoint.hold_arm(side, of(side.first_arm_joint()));
         }
     }
 }

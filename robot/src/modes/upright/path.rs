@@ -49,15 +49,6 @@ const LIMBS_AFTER: f64 = 0.5;
 /// Each round leaves about a tenth of what lacks.
 const ROUNDS: usize = 6;
 
-/// Torso in the ground's frame, seen from the side.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Side2 {
-    x: f64,
-    z: f64,
-    /// Nose up, rad.
-    pitch: f64,
-}
-
 /// The way of one robot on one place.
 #[derive(Debug, Clone, Copy)]
 pub struct Path {
@@ -67,6 +58,8 @@ pub struct Path {
     hips: [f64; 3],
     upright_rad: f64,
     stand: Isometry3<f64>,
+    /// Hip joints of the rear legs right, left, rad.
+    rear_hips: [f64; 2],
     /// Front legs right, left as they stand at [`Node::Kneel`], rad.
     standing: [Vector3<f64>; 2],
     /// Front leg and arm right, left at [`Node::Upright`], rad.
@@ -97,12 +90,12 @@ impl Geometry {
         }
     }
 
-    /// The torso with the shanks on the ground; `hips` is in front of the rear feet.
-    fn torso(&self, hips: f64, pitch: f64) -> Side2 {
+    /// x and z of the torso with the shanks on the ground; `hips` are before the rear feet.
+    fn torso(&self, hips: f64, pitch: f64) -> (f64, f64) {
         let forward = ((hips - self.knee[0]) / self.thigh).clamp(-1.0, 1.0);
         let above = self.knee[1] + self.thigh * (1.0 - forward * forward).sqrt();
         let (sin, cos) = pitch.sin_cos();
-        Side2 { x: hips + self.hips_behind * cos, z: above + self.hips_behind * sin, pitch }
+        (hips + self.hips_behind * cos, above + self.hips_behind * sin)
     }
 }
 
@@ -119,6 +112,7 @@ impl Path {
             hips: [0.0; 3],
             upright_rad: settings.pitch_rad,
             stand,
+            rear_hips: [0.0; 2],
             standing: Side::ALL.map(|side| of_leg(scene.desired, side.leg())),
             ready: Side::ALL.map(|side| poses.upright(side)),
             stowed: Side::ALL.map(|side| poses.stow(side)),
@@ -134,6 +128,7 @@ impl Path {
             }
             if node == 2.0 {
                 path.standing = Side::ALL.map(|side| of_leg(&posture, side.leg()));
+                path.rear_hips = Side::ALL.map(|side| of_leg(&posture, side.rear_leg()).x);
             }
         }
         path
@@ -154,12 +149,14 @@ impl Path {
             let joints = leg_towards(scene.model, posture, *leg, &foot);
             posture.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&joints);
         }
+        let planned = self.joints(at);
         for side in Side::ALL {
-            let [leg, arm] = self.limb(side, at);
             if at > 2.0 {
+                let leg = of_leg(&planned, side.leg());
                 posture.fixed_rows_mut::<3>(side.leg().first_joint()).copy_from(&leg);
             }
-            posture.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from(&arm);
+            let arm = side.first_arm_joint();
+            posture.fixed_rows_mut::<3>(arm).copy_from(&planned.fixed_rows::<3>(arm));
         }
         centre_of_mass(scene.model, &torso, posture).into()
     }
@@ -184,29 +181,50 @@ impl Path {
 
     /// Pose of the torso in the world at a place of the way, 1 to 3.
     pub fn torso(&self, at: f64) -> Isometry3<f64> {
-        let [touch, kneel, upright] = self.hips;
-        let level = (at - 1.0).clamp(0.0, 1.0);
-        let pitch = self.upright_rad * (at - 2.0).clamp(0.0, 1.0);
-        let hips = if pitch > 0.0 {
-            let share = (pitch.cos() - self.upright_rad.cos()) / (1.0 - self.upright_rad.cos());
-            upright + (kneel - upright) * share
-        } else {
-            touch + (kneel - touch) * level
-        };
-        let Side2 { x, z, pitch } = self.geometry.torso(hips, pitch);
+        let (hips, pitch) = self.hips_and_pitch(at);
+        let (x, z) = self.geometry.torso(hips, pitch);
         let nose_up = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -pitch);
         self.world_from_ground * Isometry3::from_parts(Vector3::new(x, 0.0, z).into(), nose_up)
     }
 
-    /// Joints of a front leg and its arm at a place of the way.
-    pub fn limb(&self, side: Side, at: f64) -> [Vector3<f64>; 2] {
+    /// Where the hips are before the rear feet, m, and how far the nose is up, rad.
+    fn hips_and_pitch(&self, at: f64) -> (f64, f64) {
+        let [touch, kneel, upright] = self.hips;
+        let pitch = self.upright_rad * (at - 2.0).clamp(0.0, 1.0);
+        if pitch > 0.0 {
+            let share = (pitch.cos() - self.upright_rad.cos()) / (1.0 - self.upright_rad.cos());
+            (upright + (kneel - upright) * share, pitch)
+        } else {
+            (touch + (kneel - touch) * (at - 1.0).clamp(0.0, 1.0), 0.0)
+        }
+    }
+
+    /// All joints at a place of the way, 1 to 3; those of front legs as they are in the air.
+    pub fn joints(&self, at: f64) -> JointVector {
+        let mut joints = JointVector::zeros();
+        let (thigh, calf) = self.shanks_down(at);
         let share = smooth((at - 2.0 - LIMBS_AFTER) / (1.0 - LIMBS_AFTER));
-        let between = |from: &Vector3<f64>, to: &Vector3<f64>| from + (to - from) * share;
-        let place = side.index();
-        [
-            between(&self.standing[place], &self.ready[place][0]),
-            between(&self.stowed[place], &self.ready[place][1]),
-        ]
+        for side in Side::ALL {
+            let place = side.index();
+            let rear = Vector3::new(self.rear_hips[place], thigh, calf);
+            joints.fixed_rows_mut::<3>(side.rear_leg().first_joint()).copy_from(&rear);
+            let [leg, arm] = &self.ready[place];
+            let between = |from: &Vector3<f64>, to: &Vector3<f64>| from + (to - from) * share;
+            let leg = between(&self.standing[place], leg);
+            joints.fixed_rows_mut::<3>(side.leg().first_joint()).copy_from(&leg);
+            let arm = between(&self.stowed[place], arm);
+            joints.fixed_rows_mut::<3>(side.first_arm_joint()).copy_from(&arm);
+        }
+        joints
+    }
+
+    /// Thigh and calf of a rear leg with its shank on the ground.
+    fn shanks_down(&self, at: f64) -> (f64, f64) {
+        let Geometry { thigh, knee, .. } = self.geometry;
+        let (hips, pitch) = self.hips_and_pitch(at);
+        let leans = ((hips - knee[0]) / thigh).clamp(-1.0, 1.0).asin();
+        let shank = -FRAC_PI_2 - (knee[1] / -knee[0]).atan();
+        (leans + pitch, shank - leans)
     }
 }
 

@@ -112,10 +112,29 @@ impl Trial {
             self.outcome.torque_step = self.outcome.torque_step.max(step / limit);
         }
         self.last = Some(torque);
-        if std::env::var_os("TRACE").is_some() && self.sut.truth().time_ns % 50_000_000 == 0 {
+        if std::env::var_os("TRACE").is_some() {
             let t = self.sut.truth();
             let s = self.sut.snapshot();
-            println!("dbg {:.2} {:?} z {:.3?} x-axis {:.2?} y-axis {:.2?} force {:.0?} est {:.3?} sev {:?} knee {:.2?} slips {}", t.time_ns as f64*1e-9, s.phase, t.world_from_torso.translation.vector.as_slice(), (t.world_from_torso.rotation*Vector3::x()).as_slice(), (t.world_from_torso.rotation*Vector3::y()).as_slice(), t.foot_force_n, s.torso.pose.translation.vector.as_slice(), s.assessment.severity, [6,7,8,9,10,11].map(|i| s.joint_position[i]), s.slips);
+            let w = self.sut.controller().wbc();
+            let c = self.sut.controller().command();
+            println!(
+                "dbg {:.4} {:?} z {:.3?} rpy {:.3?} est {:.3?} ref {:.3?} force {:.0?} q {:.2?} ff {:.1?} acc {:.1?} slips {} f {:.0?}",
+                t.time_ns as f64 * 1e-9,
+                s.phase,
+                t.world_from_torso.translation.vector.as_slice(),
+                (UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2)
+                    * t.world_from_torso.rotation)
+                    .scaled_axis()
+                    .as_slice(),
+                (s.torso.pose.rotation * s.torso.target.rotation.inverse()).scaled_axis().as_slice(),
+                (s.torso.pose.translation.vector - s.torso.target.translation.vector).as_slice(),
+                t.foot_force_n,
+                [6, 7, 8, 9, 10, 11].map(|i| s.joint_position[i]),
+                [6, 7, 8, 9, 10, 11].map(|i| c.torque[i]),
+                w.tracked().acceleration.fixed_rows::<6>(0).as_slice(),
+                s.slips,
+                w.force_problem().points
+            );
         }
         Ok(!self.sut.truth().fallen)
     }

@@ -1,23 +1,23 @@
-//! The three joints of an arm.
+//! Three joints of a limb: an arm's, or a leg's.
 
 use nalgebra::Vector3;
 
 use super::{PointReference, Robot, Track};
 use crate::{
     dynamics::DOF,
-    joints::Side,
     wbc::{Gains, task::Task},
 };
 
-/// An arm that is to keep joint angles: J is a choice of columns, so that J̇ = 0.
-pub(super) struct ArmPosture<'a> {
-    pub(super) side: Side,
+/// Joints that are to keep their angles: J is a choice of columns, so that J̇ = 0.
+pub(super) struct Posture<'a> {
+    /// The first of the three.
+    pub(super) first: usize,
     pub(super) reference: &'a PointReference,
 }
 
-impl Track for ArmPosture<'_> {
+impl Track for Posture<'_> {
     fn task(&self, robot: &Robot<'_>, gains: &Gains) -> Task {
-        let first = self.side.first_arm_joint();
+        let first = self.first;
         let mut rows = [[0.0; DOF]; 3];
         for (index, row) in rows.iter_mut().enumerate() {
             row[6 + first + index] = 1.0;
