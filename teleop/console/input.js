@@ -9,10 +9,10 @@ const KEYS = {
   KeyI: ['angular', 1, 1], KeyK: ['angular', 1, -1], KeyU: ['angular', 2, 1], KeyO: ['angular', 2, -1],
   KeyV: ['opening', 0, 1], KeyC: ['opening', 0, -1],
 };
-const MODE_KEYS = { Digit1: 'stance', Digit2: 'right_gripper', Digit3: 'left_gripper', Digit4: 'lie_down', Digit5: 'right_foot', Digit6: 'left_foot', Digit7: 'locomotion', Digit8: 'right_loco_manipulation', Digit9: 'left_loco_manipulation', Digit0: 'loco_manipulation' };
+const MODE_KEYS = { Digit1: 'stance', Digit2: 'right_gripper', Digit3: 'left_gripper', Digit4: 'lie_down', Digit5: 'right_foot', Digit6: 'left_foot', Digit7: 'locomotion', Digit8: 'right_loco_manipulation', Digit9: 'left_loco_manipulation', Digit0: 'loco_manipulation', Minus: 'bimanual' };
 // Standard mapping of the Gamepad API.
 const PAD = { a: 0, b: 1, x: 2, y: 3, rb: 5, lt: 6, rt: 7, back: 8, start: 9, l3: 10, r3: 11, up: 12, down: 13, left: 14, right: 15, lb: 4, guide: 16 };
-const PAD_MODES = [[PAD.a, 'stance'], [PAD.b, 'right_gripper'], [PAD.x, 'left_gripper'], [PAD.right, 'right_foot'], [PAD.left, 'left_foot'], [PAD.y, 'locomotion'], [PAD.up, 'right_loco_manipulation'], [PAD.down, 'left_loco_manipulation'], [PAD.start, 'lie_down']];
+const PAD_MODES = [[PAD.a, 'stance'], [PAD.b, 'right_gripper'], [PAD.x, 'left_gripper'], [PAD.right, 'right_foot'], [PAD.left, 'left_foot'], [PAD.y, 'locomotion'], [PAD.up, 'loco_manipulation'], [PAD.down, 'bimanual'], [PAD.start, 'lie_down']];
 
 export function makeInput({ engageButton, send, requestMode, stop, changed }) {
   const down = new Set();

@@ -55,8 +55,8 @@ fn pressed(button: Button, target: &mut Target, board: &Board, stop: &StopButton
     let mode = match button {
         Button::South => Mode::Stance,
         Button::North => Mode::Locomotion,
-        Button::DPadUp => Mode::RightLocoManipulation,
-        Button::DPadDown => Mode::LeftLocoManipulation,
+        Button::DPadUp => Mode::LocoManipulation,
+        Button::DPadDown => Mode::Bimanual,
         Button::East => Mode::RightGripper,
         Button::West => Mode::LeftGripper,
         Button::DPadRight => Mode::RightFoot,

@@ -270,9 +270,8 @@ impl Pilot {
                 let hand =
                     if engagement.device == Device::Joystick { &inputs.joystick } else { &inputs.browser };
                 engagement.motion = {
-                    let (side, walks) =
-                        (robot.and_then(RobotView::side), robot.is_some_and(RobotView::walks));
-                    sticks.advance(hand, side, walks, dt_s)
+                    let (hand, side) = robot.map_or((*hand, None), |robot| robot.driven(hand));
+                    sticks.advance(&hand, side, robot.is_some_and(RobotView::walks), dt_s)
                 };
                 engagement.capture_ns = now_ns;
             }

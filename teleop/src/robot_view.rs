@@ -2,6 +2,8 @@
 
 use locoman_protocol::messages::{Mode, RobotState, Severity};
 
+use crate::stick::{Hand, Target};
+
 /// A digest of the last `RobotState`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotView {
@@ -47,6 +49,19 @@ impl RobotView {
         }
     }
 
+    /// What sticks drive, and the side (0 right, 1 left) that they are for. Upright both grippers work: where there is a
+    /// choice between torso and end effector, there is one between left and right.
+    pub fn driven(&self, hand: &Hand) -> (Hand, Option<usize>) {
+        if !self.in_mode(Mode::Bimanual) {
+            return (*hand, self.side());
+        }
+        let side = match hand.target {
+            Target::Effector => 0,
+            Target::Torso => 1,
+        };
+        (Hand { target: Target::Effector, ..*hand }, Some(side))
+    }
+
     /// Whether it walks when it is told to.
     pub fn walks(&self) -> bool {
         use Mode::{LeftLocoManipulation, LocoManipulation, Locomotion, RightLocoManipulation};
@@ -55,5 +70,22 @@ impl RobotView {
                 self.mode,
                 Locomotion | LocoManipulation | RightLocoManipulation | LeftLocoManipulation
             )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn upright_the_target_chooses_the_hand() {
+        let mut sut = RobotView::new(&RobotState::default(), 0);
+        (sut.mode, sut.goal) = (Mode::Bimanual, Mode::Bimanual);
+        for (target, side) in [(Target::Effector, 0), (Target::Torso, 1)] {
+            let (hand, driven) = sut.driven(&Hand { target, ..Hand::default() });
+            assert_eq!((hand.target, driven), (Target::Effector, Some(side)));
+        }
+        sut.goal = Mode::Stance;
+        assert_eq!(sut.driven(&Hand::default()).1, None);
     }
 }

@@ -321,6 +321,8 @@ impl Controller {
                 let WbcOutput { position, velocity, torque, .. } = self.output;
                 let (kp, kd) = if walks {
                     JointGains::vectors(gains.walking_kp, gains.walking_kd)
+                } else if setpoint.contacts.kneels() {
+                    gains.kneeling()
                 } else {
                     JointGains::vectors(gains.balance_kp, gains.balance_kd)
                 };

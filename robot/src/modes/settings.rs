@@ -221,6 +221,10 @@ pub struct JointGains {
     pub balance_kp: f64,
     /// N m s/rad.
     pub balance_kd: f64,
+    /// Legs on which the robot kneels, N m/rad.
+    pub kneeling_kp: f64,
+    /// N m s/rad.
+    pub kneeling_kd: f64,
     /// Legs of a robot that walks, N m/rad.
     pub walking_kp: f64,
     /// N m s/rad.
@@ -236,6 +240,8 @@ impl Default for JointGains {
         Self {
             balance_kp: 60.0,
             balance_kd: 2.0,
+            kneeling_kp: 100.0,
+            kneeling_kd: 6.0,
             walking_kp: 60.0,
             walking_kd: 2.0,
             scripted_kp: 200.0,
@@ -245,6 +251,17 @@ impl Default for JointGains {
 }
 
 impl JointGains {
+    /// The same with those of kneeling for the rear legs.
+    pub fn kneeling(&self) -> (JointVector, JointVector) {
+        let (mut kp, mut kd) = Self::vectors(self.balance_kp, self.balance_kd);
+        for side in Side::ALL {
+            let first = side.rear_leg().first_joint();
+            kp.fixed_rows_mut::<3>(first).fill(self.kneeling_kp);
+            kd.fixed_rows_mut::<3>(first).fill(self.kneeling_kd);
+        }
+        (kp, kd)
+    }
+
     /// kp and kd of all joints. Those of the arms are 0: their servos follow positions with their own gains.
     pub fn vectors(leg_kp: f64, leg_kd: f64) -> (JointVector, JointVector) {
         let (mut kp, mut kd) = (JointVector::zeros(), JointVector::zeros());

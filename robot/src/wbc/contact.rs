@@ -113,6 +113,11 @@ impl ContactSet {
         self.share(leg) > 0.0
     }
 
+    /// Whether a knee is on the ground.
+    pub fn kneels(&self) -> bool {
+        Side::ALL.into_iter().any(|side| self.share_of(ContactPoint::Knee(side)) > 0.0)
+    }
+
     /// The legs whose feet stand on the ground, in order.
     pub fn legs(&self) -> impl Iterator<Item = Leg> + '_ {
         Leg::ALL.into_iter().filter(|leg| self.contains(*leg))

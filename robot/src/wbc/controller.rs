@@ -181,8 +181,12 @@ impl WholeBodyController {
         }
         let contact_levels = self.tracking.levels();
         for objective in objectives {
-            let gains = self.settings.gains(objective.kind(), self.walks);
-            match objective.task(&Robot { state, dynamics }, gains) {
+            let mut gains = *self.settings.gains(objective.kind(), self.walks);
+            if matches!(objective, Objective::LegPosture(leg, _) if contacts.contains(*leg)) {
+                // Two shanks hold the torso twice. The joints' own law keeps them; from here noise would come back as forces.
+                gains = gains.feed_forward();
+            }
+            match objective.task(&Robot { state, dynamics }, &gains) {
                 Some(task) => self.tracking.add(task, gains.damping_start),
                 None => status.fault = Some(WbcFault::Reference),
             }

@@ -27,6 +27,13 @@ pub struct Gains {
     pub step_share: f64,
 }
 
+impl Gains {
+    /// The same without feedback: neither joints' positions nor accelerations are asked for because of an error.
+    pub(super) fn feed_forward(&self) -> Self {
+        Self { kp: Vector3::zeros(), kd: Vector3::zeros(), step_share: 0.0, ..*self }
+    }
+}
+
 const fn whole() -> f64 {
     1.0
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector3, Vector6};
 
-use super::{ContactPoint, ContactSet, Gains, hierarchy::Rows};
+use super::{ContactSet, Gains, hierarchy::Rows};
 use crate::{
     dynamics::{DOF, Dynamics, FrameMotion},
     joints::{Leg, Side},
@@ -25,9 +25,8 @@ pub(super) struct Task {
 impl Task {
     /// What stands on the ground: it neither moves nor accelerates, so J_c q̈ = -J̇_c q̇.
     pub(super) fn contacts(dynamics: &Dynamics, contacts: &ContactSet) -> impl Iterator<Item = Self> {
-        let knees = contacts.points().any(|point| matches!(point, ContactPoint::Knee(_)));
         let feet = contacts.legs().map(|leg| Self::foot(dynamics, leg));
-        feet.chain(knees.then(|| Self::knees(dynamics)))
+        feet.chain(contacts.kneels().then(|| Self::knees(dynamics)))
     }
 
     fn foot(dynamics: &Dynamics, leg: Leg) -> Self {

@@ -29,7 +29,9 @@ const PAIRS: [[Leg; 2]; 2] = [[Leg::FrontRight, Leg::RearLeft], [Leg::FrontLeft,
 
 /// The rows of the table of modes that stand, and both pairs of feet of a trot with the objectives of a stance.
 pub fn standing() -> Vec<Case> {
-    let rows = TABLE.iter().filter(|row| !matches!(row.mode, Mode::Locomotion | Mode::LocoManipulation(_)));
+    let rows = TABLE
+        .iter()
+        .filter(|row| !matches!(row.mode, Mode::Locomotion | Mode::LocoManipulation(_) | Mode::Bimanual));
     let of = |name: String, stance: &[Leg], objectives: &[ObjectiveKind]| Case {
         name,
         stance: stance.to_vec(),

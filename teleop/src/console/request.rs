@@ -32,6 +32,7 @@ pub(super) enum ModeName {
     RightLocoManipulation,
     LeftLocoManipulation,
     LocoManipulation,
+    Bimanual,
     LieDown,
 }
 
@@ -47,6 +48,7 @@ impl From<ModeName> for Mode {
             ModeName::RightLocoManipulation => Self::RightLocoManipulation,
             ModeName::LeftLocoManipulation => Self::LeftLocoManipulation,
             ModeName::LocoManipulation => Self::LocoManipulation,
+            ModeName::Bimanual => Self::Bimanual,
             ModeName::LieDown => Self::LieDown,
         }
     }

@@ -148,7 +148,7 @@ fn r_safe_012_while_stopping_nothing_else_is_accepted() {
     assert_eq!(run(&mut sut, &stopping).last(), Some(&Phase::Damped));
 }
 
-const MODES: [Mode; 11] = [
+const MODES: [Mode; 12] = [
     Mode::Damped,
     Mode::Stance,
     Mode::LieDown,
@@ -160,7 +160,27 @@ const MODES: [Mode; 11] = [
     Mode::LocoManipulation(Arms::One(Side::Right)),
     Mode::LocoManipulation(Arms::One(Side::Left)),
     Mode::LocoManipulation(Arms::Both),
+    Mode::Bimanual,
 ];
+
+#[test]
+fn sitting_up_and_coming_down_turn_round_anywhere() {
+    let mut sut = standing();
+    ask(&mut sut, Mode::Bimanual);
+    assert_eq!(
+        run(&mut sut, &calm()),
+        [Phase::Kneel, Phase::SitUp, Phase::Bimanual],
+        "the request itself leaves the stance"
+    );
+    ask(&mut sut, Mode::Stance);
+    assert_eq!(sut.phase(), Phase::SitDown);
+    ask(&mut sut, Mode::Bimanual);
+    assert_eq!(sut.phase(), Phase::SitUp);
+    ask(&mut sut, Mode::LieDown);
+    let way = run(&mut sut, &calm());
+    let down = [Phase::SitDown, Phase::GetUp, Phase::Recentre, Phase::Stance, Phase::LieDown, Phase::Damped];
+    assert_eq!(way, down);
+}
 
 /// All states that any inputs can lead to within `depth` steps.
 fn reachable(from: Machine, depth: usize) -> HashSet<Machine> {

@@ -61,9 +61,10 @@ impl Upright {
         }
     }
 
-    /// Takes up the joints as they are held, wherever an operator has led them.
+    /// Takes up the joints as they are, wherever an operator has led them. (What is asked of them includes what was learned
+    /// of their loads.)
     pub fn take_up(&mut self, motions: &MotionSettings, scene: &Scene<'_>) {
-        self.offset = scene.desired - self.path.joints(self.place(self.time_s));
+        self.offset = scene.state.position - self.path.joints(self.place(self.time_s));
         let duration_s = (self.offset.amax() / motions.leg_rad_s).max(motions.torso_s);
         let whole = PointReference::hold(Vector3::x());
         self.fades = PointMotion::new(&whole, &Vector3::zeros(), duration_s);
@@ -115,6 +116,9 @@ impl Upright {
             && settled
             && !waits
         {
+            if next == Node::Upright {
+                self.path.stand_here(scene);
+            }
             self.towards = Some(next);
             self.head(setpoint);
         }

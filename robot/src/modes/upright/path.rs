@@ -161,6 +161,11 @@ impl Path {
         centre_of_mass(scene.model, &torso, posture).into()
     }
 
+    /// The front feet stand as they do now: so they leave the ground, and so they come back to it.
+    pub fn stand_here(&mut self, scene: &Scene<'_>) {
+        self.standing = Side::ALL.map(|side| of_leg(&scene.state.position, side.leg()));
+    }
+
     /// Goes with the rear feet where they slide or creep, by a share of the way: what keeps the balance is where the torso
     /// is above them.
     pub fn follow(&mut self, scene: &Scene<'_>, share: f64) {

@@ -57,6 +57,7 @@ pub fn run(configs: &Path, args: &Args, seed: u64) -> anyhow::Result<Report> {
         Figure::new("torque_step", 100.0 * worst(|o| o.torque_step), "% of the limit")
             .must(Must::AtMost(30.0)),
     );
+    report.push(Figure::new("torque_step_pushed", 100.0 * worst(|o| o.pushed_step), "% of the limit"));
     report.push(Figure::new("torque", 100.0 * worst(|o| o.torque), "% of the limit"));
     Ok(report)
 }

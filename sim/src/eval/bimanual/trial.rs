@@ -51,8 +51,10 @@ pub struct Outcome {
     pub greatest_rad: f64,
     /// Greatest height of a gripper above the floor, m.
     pub height_m: f64,
-    /// Greatest change of a joint's commanded torque from tick to tick, and greatest torque, as shares of its limit.
+    /// Greatest change of a leg joint's commanded torque from tick to tick, and greatest torque, as shares of its limit.
     pub torque_step: f64,
+    /// The same change while it is pushed.
+    pub pushed_step: f64,
     /// See above.
     pub torque: f64,
 }
@@ -62,6 +64,7 @@ struct Trial {
     sut: Lockstep,
     model: Model,
     last: Option<JointVector>,
+    pushed: bool,
     outcome: Outcome,
 }
 
@@ -75,7 +78,7 @@ pub fn play(configs: &Path, profile: &str, seed: u64) -> anyhow::Result<Outcome>
     let coefficient = random.random_range(0.5..1.0);
     sut.plant_mut().disturb(&Disturbance::Friction { foot: None, coefficient })?;
     sut.go_to(Mode::Stance)?;
-    let mut trial = Trial { sut, model, last: None, outcome: Outcome::default() };
+    let mut trial = Trial { sut, model, last: None, pushed: false, outcome: Outcome::default() };
     trial.run(&mut random, seed)?;
     Ok(trial.outcome)
 }
@@ -109,33 +112,11 @@ impl Trial {
             let limit = self.model.max_torque[joint];
             self.outcome.torque = self.outcome.torque.max(torque[joint].abs() / limit);
             let step = self.last.map_or(0.0, |last| (torque[joint] - last[joint]).abs());
-            self.outcome.torque_step = self.outcome.torque_step.max(step / limit);
+            let worst =
+                if self.pushed { &mut self.outcome.pushed_step } else { &mut self.outcome.torque_step };
+            *worst = worst.max(step / limit);
         }
         self.last = Some(torque);
-        if std::env::var_os("TRACE").is_some() {
-            let t = self.sut.truth();
-            let s = self.sut.snapshot();
-            let w = self.sut.controller().wbc();
-            let c = self.sut.controller().command();
-            println!(
-                "dbg {:.4} {:?} z {:.3?} rpy {:.3?} est {:.3?} ref {:.3?} force {:.0?} q {:.2?} ff {:.1?} acc {:.1?} slips {} f {:.0?}",
-                t.time_ns as f64 * 1e-9,
-                s.phase,
-                t.world_from_torso.translation.vector.as_slice(),
-                (UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2)
-                    * t.world_from_torso.rotation)
-                    .scaled_axis()
-                    .as_slice(),
-                (s.torso.pose.rotation * s.torso.target.rotation.inverse()).scaled_axis().as_slice(),
-                (s.torso.pose.translation.vector - s.torso.target.translation.vector).as_slice(),
-                t.foot_force_n,
-                [6, 7, 8, 9, 10, 11].map(|i| s.joint_position[i]),
-                [6, 7, 8, 9, 10, 11].map(|i| c.torque[i]),
-                w.tracked().acceleration.fixed_rows::<6>(0).as_slice(),
-                s.slips,
-                w.force_problem().points
-            );
-        }
         Ok(!self.sut.truth().fallen)
     }
 
@@ -233,6 +214,7 @@ impl Trial {
     /// Each gripper is pushed along each axis in both directions.
     fn pushed(&mut self) -> anyhow::Result<bool> {
         self.sut.release();
+        self.pushed = true;
         for side in Side::ALL {
             for axis in 0..3 {
                 for sign in [1.0, -1.0] {
@@ -245,6 +227,7 @@ impl Trial {
                 }
             }
         }
+        self.pushed = false;
         Ok(self.sut.snapshot().mode == Mode::Bimanual)
     }
 }
