@@ -23,8 +23,8 @@ pub struct ArmSample {
     pub hottest_c: f64,
 }
 
-/// Arms and grippers.
-pub trait Arms: Send {
+/// The servos of arms and grippers.
+pub trait ArmServos: Send {
     /// Hands the arms' part of a command over and returns the newest sample. Never waits.
     fn exchange(&mut self, command: &JointCommand) -> ArmSample;
 }
@@ -51,7 +51,7 @@ impl FoldedArms {
     }
 }
 
-impl Arms for FoldedArms {
+impl ArmServos for FoldedArms {
     fn exchange(&mut self, _: &JointCommand) -> ArmSample {
         self.sample
     }

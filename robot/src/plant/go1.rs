@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Arms, Health, JointCommand, Plant, PlantError, Sensors, SustainedPower, arms::ArmSample};
+use super::{ArmServos, Health, JointCommand, Plant, PlantError, Sensors, SustainedPower, arms::ArmSample};
 use crate::{
     go1::{Driver, Feet, LineCounts, MOTORS, MotorMode, Report, state::MotorState},
     joints::JointVector,
@@ -20,7 +20,7 @@ const CELLS: usize = 6;
 /// The robot. Paces its caller at 500 Hz.
 pub struct Go1Plant {
     driver: Driver,
-    arms: Box<dyn Arms>,
+    arms: Box<dyn ArmServos>,
     feet: Feet,
     power: SustainedPower,
     braking: u32,
@@ -30,7 +30,7 @@ pub struct Go1Plant {
 
 impl Go1Plant {
     /// A robot behind a driver that runs, with these arms.
-    pub fn new(driver: Driver, arms: Box<dyn Arms>) -> Self {
+    pub fn new(driver: Driver, arms: Box<dyn ArmServos>) -> Self {
         let feet = driver.settings().feet;
         Self {
             driver,

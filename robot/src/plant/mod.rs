@@ -10,7 +10,7 @@ pub mod preflight;
 mod sim;
 pub mod wire;
 
-pub use arms::Arms;
+pub use arms::ArmServos;
 pub use go1::Go1Plant;
 pub use health::{Health, SustainedPower};
 use serde::{Deserialize, Serialize};

@@ -149,7 +149,12 @@ impl SimRobot {
 
     /// Advances by one exchange and measures.
     pub fn advance(&mut self) -> Result<Sensors, SimRobotError> {
-        for _ in 0..self.steps_per_exchange {
+        self.advance_by(EXCHANGE_NS)
+    }
+
+    /// Advances by a time and measures; by whole steps of the physics.
+    pub fn advance_by(&mut self, time_ns: u64) -> Result<Sensors, SimRobotError> {
+        for _ in 0..time_ns / self.step_ns() {
             while self.under_way.front().is_some_and(|(due, _)| *due <= self.step) {
                 self.apply_next();
             }
@@ -200,7 +205,7 @@ impl SimRobot {
 
     /// The sensors' clock now, ns.
     pub fn time_ns(&self) -> u64 {
-        self.epoch_ns + self.step / self.steps_per_exchange * EXCHANGE_NS
+        self.epoch_ns + self.step * EXCHANGE_NS / self.steps_per_exchange
     }
 
     /// Seconds since time zero.
