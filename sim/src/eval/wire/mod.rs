@@ -6,6 +6,7 @@
 mod wired;
 
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use anyhow::ensure;
 use locoman_protocol::geometry;
@@ -53,6 +54,14 @@ pub fn run(configs: &Path, args: Args, seed: u64) -> anyhow::Result<Report> {
 
     tracing::debug!("in lockstep: {in_process}over the wires: {over_wires}");
     push_periods(&mut report, &heard);
+    let counters = wired.robot.counters();
+    let lost_ms = counters.lost_ns.load(Ordering::Relaxed) as f64 * 1e-6;
+    report.push(Figure::new(
+        "virtual_robot.late",
+        counters.late_exchanges.load(Ordering::Relaxed) as f64,
+        "",
+    ));
+    report.push(Figure::new("virtual_robot.time_given_up", lost_ms, "ms"));
     for name in ["falls", "engaged"] {
         let figure = Figure::new(format!("wires.{name}"), over_wires.value(name).unwrap_or(f64::NAN), "");
         report.push(if name == "falls" { figure.must(Must::AtMost(0.0)) } else { figure });
