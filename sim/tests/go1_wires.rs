@@ -30,8 +30,8 @@ fn r_safe_019_when_the_controller_stalls_the_motors_hold_then_damp_and_stay_damp
     let heard: Vec<Heard> = sut.robot.heard().collect();
     let damped_ns = damped_after(&heard, stalled_ns).unwrap();
     let after_ms = (damped_ns - stalled_ns) as f64 * 1e-6;
-    // 40 ms by the settings; a busy machine may be late, and is not asked to be in time here.
-    assert!((30.0..500.0).contains(&after_ms), "{after_ms} ms");
+    // 30 ms by the settings; a busy machine may be late, and is not asked to be in time here.
+    assert!((20.0..500.0).contains(&after_ms), "{after_ms} ms");
     let held = heard.iter().filter(|heard| {
         let motor = heard.command.motors[0];
         motor.kp > 0 && motor.dq_rad_s == 0.0
@@ -42,6 +42,8 @@ fn r_safe_019_when_the_controller_stalls_the_motors_hold_then_damp_and_stay_damp
     assert!(sut.plant.health().sender_damped);
     assert!(sut.robot.heard().all(|heard| asks_for_damping(&heard.command)));
     sut.run(&JointCommand::damping(), 0.05);
+    assert!(sut.plant.health().sender_damped, "it is told for a while");
+    sut.run(&JointCommand::damping(), 1.0);
     assert!(!sut.plant.health().sender_damped);
     sut.run(&moving, 0.05);
     assert!(!asks_for_damping(&sut.robot.heard().last().unwrap().command));

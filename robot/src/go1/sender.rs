@@ -30,6 +30,8 @@ use super::{
 /// Time between two commands, ns.
 pub const PERIOD_NS: u64 = 2_000_000;
 
+/// A period of the sender counts as at most so long.
+const LONGEST_PERIOD_NS: u64 = 2 * PERIOD_NS;
 /// How long a taken port is waited for: longer than a sender lingers by default.
 const PORT_PATIENCE: Duration = Duration::from_secs(5);
 
@@ -55,8 +57,12 @@ struct Sender<'a> {
     feed: &'a FeedEnd,
     watchdog: Watchdog,
     clock: SampleClock,
-    /// The controller's last command, and when it was read.
-    last: Option<(LowCommand, u64)>,
+    /// The controller's last command.
+    last: Option<LowCommand>,
+    /// Its age, ns: as far as the sender itself was awake.
+    age_ns: u64,
+    /// When something was sent last.
+    spoke_ns: u64,
     ended: bool,
     /// The robot has not answered yet.
     unheard: bool,
@@ -81,6 +87,8 @@ pub fn run(settings: &Go1Settings, feed: &FeedEnd) -> Result<(), SenderError> {
         watchdog: Watchdog::new(watchdog),
         clock: SampleClock::default(),
         last: None,
+        age_ns: 0,
+        spoke_ns: 0,
         ended: false,
         unheard: true,
         chord: false,
@@ -149,14 +157,18 @@ impl Sender<'_> {
 
     /// Takes the newest command in and sends what the watchdog makes of it.
     fn speak(&mut self, now_ns: u64) {
+        // What holds the sender up may hold the controller up too, and nothing can be sent meanwhile: that time
+        // does not count against the controller, which gets the time to answer that it always has.
+        self.age_ns += now_ns.saturating_sub(self.spoke_ns).min(LONGEST_PERIOD_NS);
+        self.spoke_ns = now_ns;
         match self.feed.newest_command() {
-            Arrival::New(command) => self.last = Some((command, now_ns)),
+            Arrival::New(command) => (self.last, self.age_ns) = (Some(command), 0),
             Arrival::Nothing => {}
             Arrival::Ended => self.ended = true,
         }
-        let Some((command, received_ns)) = self.last else { return };
+        let Some(command) = self.last else { return };
         self.verdict = self.watchdog.judge(&Signs {
-            age_ns: now_ns - received_ns,
+            age_ns: self.age_ns,
             asks_for_damping: asks_for_damping(&command),
             chord: self.chord,
             ended: self.ended,

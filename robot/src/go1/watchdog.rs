@@ -33,7 +33,7 @@ pub struct WatchdogSettings {
 
 impl Default for WatchdogSettings {
     fn default() -> Self {
-        Self { hold_ms: 10.0, damp_ms: 40.0, linger_ms: 3000.0, damping_kd: 3.0 }
+        Self { hold_ms: 10.0, damp_ms: 30.0, linger_ms: 3000.0, damping_kd: 3.0 }
     }
 }
 
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn r_safe_019_a_late_controller_first_holds_then_damps_before_50_ms() {
         let mut sut = sut();
-        let verdicts = [0, 9, 10, 39, 40].map(|ms| sut.judge(&aged(ms)));
+        let verdicts = [0, 9, 10, 29, 30].map(|ms| sut.judge(&aged(ms)));
         assert_eq!(
             verdicts,
             [Verdict::Follow, Verdict::Follow, Verdict::Hold, Verdict::Hold, Verdict::DampLate]

@@ -12,6 +12,8 @@ use crate::{
 const EXCHANGE_TIMEOUT: Duration = Duration::from_millis(8);
 /// A motor that brakes for so many samples although it is told to follow has a fault: 0.2 s.
 const BRAKING_SAMPLES: u32 = 100;
+/// That the sender has damped is told for so many samples, 0.5 s, so that nobody misses it.
+const TOLD_SAMPLES: u32 = 250;
 /// An attitude's quaternion is at least so long, or it is none.
 const SHORTEST_QUATERNION: f64 = 0.5;
 /// Cells of the battery.
@@ -24,6 +26,10 @@ pub struct Go1Plant {
     feet: Feet,
     power: SustainedPower,
     braking: u32,
+    /// The last command asked for damping.
+    damped: bool,
+    /// Samples in which it is still told that the sender has damped.
+    telling: u32,
     health: Health,
     report: Option<Report>,
 }
@@ -38,6 +44,8 @@ impl Go1Plant {
             feet,
             power: SustainedPower::default(),
             braking: 0,
+            damped: true,
+            telling: 0,
             health: Health::default(),
             report: None,
         }
@@ -58,8 +66,12 @@ impl Go1Plant {
         &self.driver
     }
 
-    fn judge(&mut self, report: &Report, arms: &ArmSample) -> Health {
+    fn judge(&mut self, report: &Report, arms: &ArmSample, damped: bool) -> Health {
         let state = &report.state;
+        // Motors that were damped by command may be damped by the sender as well: that is no news.
+        let overruled = report.verdict.damps() && !damped && !self.damped;
+        self.damped = damped;
+        self.telling = if overruled { TOLD_SAMPLES } else { self.telling.saturating_sub(1) };
         let motors = &state.motors[..MOTORS];
         let brakes = motors.iter().any(|motor| motor.mode() == MotorMode::Brake);
         self.braking = if brakes { self.braking + 1 } else { 0 };
@@ -70,7 +82,7 @@ impl Go1Plant {
         let cells = state.battery.cells[..CELLS].iter().map(|steps| 0.032 * f64::from(*steps));
         Health {
             remote_stop: state.remote().is_some_and(|remote| remote.asks_for_stop()),
-            sender_damped: report.verdict.damps(),
+            sender_damped: self.telling > 0,
             motor_fault: motors.iter().any(refuses) || self.braking > BRAKING_SAMPLES,
             motor_c: hottest(&mut motors.iter().map(|motor| motor.temperature_c)),
             battery_percent: f64::from(state.battery.charge_percent),
@@ -89,7 +101,8 @@ impl Plant for Go1Plant {
         let Some(report) = self.driver.exchange(command, EXCHANGE_TIMEOUT)? else {
             return Err(PlantError::Silent { waited_ms: EXCHANGE_TIMEOUT.as_millis() as u64 });
         };
-        self.health = self.judge(&report, &arms);
+        let damped = command.kp.amax() == 0.0 && command.torque.amax() == 0.0;
+        self.health = self.judge(&report, &arms, damped);
         self.report = Some(report);
         Ok(sensors(&report, &arms, &self.feet))
     }
