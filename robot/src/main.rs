@@ -18,6 +18,7 @@ use locoman_robot::{
     control::{Controller, Options, RobotConfig, Wish, run},
     link::RobotLink,
     plant::{Plant, SimPlant},
+    servo,
 };
 use tracing_subscriber::EnvFilter;
 
@@ -41,6 +42,8 @@ enum Command {
     Run(RunArgs),
     /// Check the configuration and the model, and say what is loaded.
     Check,
+    /// Find, set up, zero and move the servos of arms and grippers.
+    Servo(servo::cli::Args),
 }
 
 #[derive(Debug, clap::Args)]
@@ -89,10 +92,11 @@ fn execute(cli: &Cli) -> anyhow::Result<()> {
     let filter = EnvFilter::try_new(&cli.log)
         .map_err(|error| anyhow::anyhow!("--log {}: {error}; try `info` or `debug`", cli.log))?;
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    let config = RobotConfig::load(&cli.configs)?;
+    let config = || RobotConfig::load(&cli.configs);
     match &cli.command {
-        Command::Run(args) => control(config, args),
-        Command::Check => check(&config),
+        Command::Run(args) => control(config()?, args),
+        Command::Check => check(&config()?),
+        Command::Servo(args) => servo::cli::run(args, &cli.configs, &mut servo::cli::Terminal),
     }
 }
 
