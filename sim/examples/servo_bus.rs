@@ -1,5 +1,5 @@
 //! The virtual servos alone, for anyone who speaks the protocol: prints the path of the pseudo-terminal and answers
-//! there until its standard input ends. `sim/scripts/dynamixel_sdk.py` holds it to the maker's own library.
+//! there until its standard input ends. `sim/scripts/servo_bus.py` holds it to the maker's own library.
 
 use std::io::Read;
 

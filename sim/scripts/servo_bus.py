@@ -4,7 +4,7 @@ Not part of the test suite, which needs no Python packages. To run it:
 
     python3 -m venv /tmp/dxl && /tmp/dxl/bin/pip install dynamixel-sdk
     cargo build -p locoman-sim --example servo_bus
-    /tmp/dxl/bin/python sim/scripts/dynamixel_sdk.py target/debug/examples/servo_bus
+    /tmp/dxl/bin/python sim/scripts/servo_bus.py target/debug/examples/servo_bus
 """
 
 import subprocess
