@@ -45,15 +45,15 @@ impl<F: FnMut(&str)> Person for Scripted<F> {
     }
 }
 
-fn open(virtual_bus: &VirtualBus) -> (Bus<SerialLine>, ServoSettings) {
+fn open(virtual_bus: &VirtualBus) -> anyhow::Result<(Bus<SerialLine>, ServoSettings)> {
     let settings = ServoSettings {
         port: virtual_bus.path().to_owned(),
         reply_slack_ms: 50.0,
         watchdog_ms: 2540,
         ..ServoSettings::default()
     };
-    let line = SerialLine::open(&settings.port, settings.baud).unwrap();
-    (Bus::new(line, settings.baud, settings.reply_slack()), settings)
+    let line = SerialLine::open(&settings.port, settings.baud)?;
+    Ok((Bus::new(line, settings.baud, settings.reply_slack()), settings))
 }
 
 fn quick() -> VirtualBusSetup {
@@ -65,7 +65,7 @@ fn a_scan_tells_who_is_ready_who_is_missing_and_what_a_cycle_takes() {
     let virtual_bus = VirtualBus::open(&quick()).unwrap();
     virtual_bus.inject(LEFT_2, ServoFault::Vanishes);
     virtual_bus.inject(RIGHT_1, ServoFault::Overloads);
-    let (mut bus, settings) = open(&virtual_bus);
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let mut person = Scripted::new(false, |_| {});
     scan(&mut bus, &settings, virtual_bus.path(), &mut person).unwrap();
     let text = person.text();
@@ -76,18 +76,18 @@ fn a_scan_tells_who_is_ready_who_is_missing_and_what_a_cycle_takes() {
 }
 
 /// One new servo on the line.
-fn new_servo(place: Place) -> VirtualBus {
-    let virtual_bus = VirtualBus::open(&VirtualBusSetup { new_servos: true, ..quick() }).unwrap();
+fn new_servo(place: Place) -> anyhow::Result<VirtualBus> {
+    let virtual_bus = VirtualBus::open(&VirtualBusSetup { new_servos: true, ..quick() })?;
     for other in Place::ALL.into_iter().filter(|other| *other != place) {
         virtual_bus.inject(other, ServoFault::Vanishes);
     }
-    virtual_bus
+    Ok(virtual_bus)
 }
 
 #[test]
 fn without_a_yes_nothing_is_written_into_a_servo() {
-    let virtual_bus = new_servo(LEFT_2);
-    let (mut bus, settings) = open(&virtual_bus);
+    let virtual_bus = new_servo(LEFT_2).unwrap();
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let mut person = Scripted::new(false, |_| {});
     let error = set_up(&mut bus, LEFT_2, &settings, &mut person).unwrap_err().to_string();
     assert!(error.contains("nothing was written for left-2"), "{error}");
@@ -98,8 +98,8 @@ fn without_a_yes_nothing_is_written_into_a_servo() {
 
 #[test]
 fn a_new_servo_gets_id_speed_and_settings_after_a_yes() {
-    let virtual_bus = new_servo(LEFT_2);
-    let (mut bus, settings) = open(&virtual_bus);
+    let virtual_bus = new_servo(LEFT_2).unwrap();
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let mut person = Scripted::new(true, |_| {});
     set_up(&mut bus, LEFT_2, &settings, &mut person).unwrap();
     assert!(person.text().contains("operating mode: 3 becomes 5"), "{}", person.text());
@@ -110,7 +110,7 @@ fn a_new_servo_gets_id_speed_and_settings_after_a_yes() {
 #[test]
 fn two_servos_at_once_are_not_set_up() {
     let virtual_bus = VirtualBus::open(&quick()).unwrap();
-    let (mut bus, settings) = open(&virtual_bus);
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let mut person = Scripted::new(true, |_| {});
     let error = set_up(&mut bus, LEFT_2, &settings, &mut person).unwrap_err().to_string();
     assert!(error.contains("8 servos answer (id 1 at 1000000 baud, id 2 at"), "{error}");
@@ -136,7 +136,7 @@ fn directions_and_zeros_are_found_by_hand_whatever_the_settings_believe() {
     let zero_counts = [17, 4000, 2048, 3000, 1, 4095, 100, 2000];
     let setup = VirtualBusSetup { settings: assembled, zero_counts, ..quick() };
     let virtual_bus = VirtualBus::open(&setup).unwrap();
-    let (mut bus, settings) = open(&virtual_bus);
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let mut positions = folded();
     let stand = |positions: &[f64; SERVOS]| {
         virtual_bus
@@ -167,7 +167,7 @@ fn directions_and_zeros_are_found_by_hand_whatever_the_settings_believe() {
 #[test]
 fn a_joint_is_moved_after_a_yes_and_let_go_and_one_that_is_blocked_is_told() {
     let virtual_bus = VirtualBus::open(&quick()).unwrap();
-    let (mut bus, settings) = open(&virtual_bus);
+    let (mut bus, settings) = open(&virtual_bus).unwrap();
     let zeros = virtual_bus.zeros();
     let going = Going { place: RIGHT_1, angle_rad: -2.9, speed_rad_s: 1.0 };
     let mut refusing = Scripted::new(false, |_| {});

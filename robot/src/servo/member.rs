@@ -1,5 +1,7 @@
 //! One servo of the bus: brought to its settings, given goals, judged by its answers.
 
+use locoman_protocol::clock::monotonic_ns;
+
 use super::{
     Angles, ServoCommand, ServoError, ServoSettings,
     bus::Bus,
@@ -82,6 +84,7 @@ impl Member {
         bus.write(id, reg::BUS_WATCHDOG, settings.watchdog_ms / reg::WATCHDOG_STEP_MS)?;
         self.goal_rad = self.angles.angle_rad(count);
         self.state.position_rad = self.goal_rad;
+        self.state.sample_ns = monotonic_ns();
         (self.told_current, self.effort, self.lost_in_row, self.alert) = (0, 0.0, 0, false);
         self.state.present = true;
         Ok(())

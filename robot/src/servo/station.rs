@@ -42,7 +42,7 @@ impl<L: Line> Station<L> {
     pub fn adopt_all(&mut self, settings: &ServoSettings) -> Result<(), ServoError> {
         let mut missing = Vec::new();
         for member in &mut self.members {
-            match self.bus.ping(member.id) {
+            match patiently(|| self.bus.ping(member.id)) {
                 Err(ServoError::Silent { .. }) => missing.push((member.place, member.id)),
                 found => {
                     found?;
@@ -53,11 +53,11 @@ impl<L: Line> Station<L> {
             return Err(ServoError::Missing { missing });
         }
         for member in &mut self.members {
-            member.adopt(&mut self.bus, settings)?;
+            patiently(|| member.adopt(&mut self.bus, settings))?;
         }
         self.choose_read(settings)?;
         for index in 0..SERVOS {
-            self.ask_supply(index)?;
+            patiently(|| self.ask_supply(index))?;
         }
         Ok(())
     }
@@ -304,4 +304,17 @@ fn next(cursor: &mut usize, wanted: impl Fn(usize) -> bool) -> Option<usize> {
     let found = (1..=SERVOS).map(|step| (*cursor + step) % SERVOS).find(|index| wanted(*index))?;
     *cursor = found;
     Some(found)
+}
+
+/// Tries a few times before it believes a silence: at the start a lost answer must not look like a missing servo.
+fn patiently<T>(mut exchange: impl FnMut() -> Result<T, ServoError>) -> Result<T, ServoError> {
+    /// Times altogether.
+    const TRIES: usize = 4;
+    for _ in 1..TRIES {
+        match exchange() {
+            Err(ServoError::Silent { .. }) => {}
+            outcome => return outcome,
+        }
+    }
+    exchange()
 }
