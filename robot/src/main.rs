@@ -9,7 +9,7 @@ use std::{
 
 use clap::{Parser, Subcommand};
 use locoman_protocol::realtime;
-use locoman_robot::{control::RobotConfig, go1::Go1Settings};
+use locoman_robot::{control::RobotConfig, go1::Go1Settings, servo};
 use tracing_subscriber::EnvFilter;
 
 /// Model, estimators, whole-body controller and supervisor of the LocoMan robot.
@@ -32,6 +32,8 @@ enum Command {
     Run(run::Args),
     /// Check the configuration and the model, and say what is loaded.
     Check,
+    /// Find, set up, zero and move the servos of arms and grippers.
+    Servo(servo::cli::Args),
     /// Own the line to a Go1 for a controller, and damp its motors when that ends. Started by `run`.
     #[command(hide = true)]
     Wire(run::WireArgs),
@@ -55,6 +57,7 @@ fn execute(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Run(args) => run::run(cli, args),
         Command::Check => check(&cli.configs),
+        Command::Servo(args) => servo::cli::run(args, &cli.configs, &mut servo::cli::Terminal),
         Command::Wire(args) => run::wire(cli, args),
     }
 }
