@@ -2,6 +2,7 @@
 
 use std::{
     net::SocketAddr,
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicU8, Ordering},
@@ -21,10 +22,11 @@ use locoman_robot::{
     },
     link::RobotLink,
     plant::{
-        Go1Plant, JointCommand, Plant, PlantError, SimPlant,
+        ArmServos, BusServos, Go1Plant, JointCommand, Plant, PlantError, SimPlant,
         arms::FoldedArms,
         preflight::{self, Finding},
     },
+    servo::{ServoDriver, ServoError, ServoSettings, Zeros, default_zeros_file},
     supervisor::Thresholds,
 };
 
@@ -41,6 +43,8 @@ pub struct Args {
     sim: SocketAddr,
     #[command(flatten)]
     line: WireArgs,
+    #[command(flatten)]
+    arms: ArmArgs,
     /// Where stations reach this robot; may be given more than once.
     #[arg(long, value_name = "ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
     listen: Vec<String>,
@@ -66,6 +70,28 @@ pub struct WireArgs {
     go1_local: Option<SocketAddr>,
 }
 
+/// The arms of a Go1.
+#[derive(Debug, clap::Args)]
+struct ArmArgs {
+    /// Whether the arms' servos are driven.
+    #[arg(long, value_enum, default_value = "bus")]
+    arms: ArmKind,
+    /// The servos' port. Default: `port` of servos.toml.
+    #[arg(long, value_name = "PORT")]
+    servo_port: Option<String>,
+    /// The servos' zero angles. Default: where `locoman-robot servo zero` has put them.
+    #[arg(long, value_name = "FILE")]
+    servo_zeros: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ArmKind {
+    /// Eight servos on their bus.
+    Bus,
+    /// Nothing is connected: the arms are folded along the calves, and stay so.
+    Folded,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum PlantKind {
     /// The simulated robot of `locoman-sim robot`.
@@ -79,6 +105,9 @@ enum PlantKind {
 const EXCHANGE_TIMEOUT: Duration = Duration::from_millis(20);
 /// How long a Go1 is waited for when the program starts.
 const MEETING_PATIENCE: Duration = Duration::from_secs(10);
+/// How long servos may take to answer all, and between two tries.
+const SERVO_PATIENCE: Duration = Duration::from_secs(5);
+const SERVO_PAUSE: Duration = Duration::from_millis(200);
 /// States that a Go1 must have sent before it is looked at: speeds and modes have settled.
 const MEETING_SAMPLES: u32 = 100;
 
@@ -95,7 +124,7 @@ pub fn run(cli: &Cli, args: &Args) -> anyhow::Result<()> {
             SimPlant::open(args.sim, EXCHANGE_TIMEOUT)
                 .with_context(|| format!("cannot reach the simulated robot at {}; see --sim", args.sim))?,
         ),
-        PlantKind::Go1 => Box::new(meet_go1(cli, &args.line, &config)?),
+        PlantKind::Go1 => Box::new(meet_go1(cli, args, &config)?),
     };
     let auto_stand = args.auto_stand.unwrap_or(args.plant == PlantKind::Sim);
     let mut controller = Controller::new(config, Options { auto_stand });
@@ -133,8 +162,9 @@ fn settings(cli: &Cli, args: &WireArgs) -> anyhow::Result<Go1Settings> {
 }
 
 /// Starts the sender, waits for the robot, and looks at it: damped, before anything may move.
-fn meet_go1(cli: &Cli, args: &WireArgs, config: &RobotConfig) -> anyhow::Result<Go1Plant> {
-    let settings = settings(cli, args)?;
+fn meet_go1(cli: &Cli, args: &Args, config: &RobotConfig) -> anyhow::Result<Go1Plant> {
+    let arms = arms(cli, &args.arms, config)?;
+    let settings = settings(cli, &args.line)?;
     let mut wire = vec!["--configs".into(), cli.configs.clone().into_os_string()];
     wire.extend(["--log", &cli.log, "wire", "--go1", &settings.board.to_string()].map(Into::into));
     wire.extend(["--go1-local", &settings.local.to_string()].map(Into::into));
@@ -142,7 +172,7 @@ fn meet_go1(cli: &Cli, args: &WireArgs, config: &RobotConfig) -> anyhow::Result<
     let program = Program { path: "/proc/self/exe".into(), args: wire };
     let driver =
         Driver::start(settings, Place::Process(program)).context("cannot start the sender's process")?;
-    let mut plant = Go1Plant::new(driver, Box::new(FoldedArms::new(&config.control.poses)));
+    let mut plant = Go1Plant::new(driver, arms);
     tracing::info!(board = %settings.board, "waiting for the robot");
     let findings = look(&mut plant, &config.thresholds).with_context(|| {
         format!(
@@ -161,6 +191,35 @@ fn meet_go1(cli: &Cli, args: &WireArgs, config: &RobotConfig) -> anyhow::Result<
         .collect();
     anyhow::ensure!(obstacles.is_empty(), "the robot is not fit to move:\n  {}", obstacles.join("\n  "));
     Ok(plant)
+}
+
+/// Brings the servos up, limp, or takes the arms as folded.
+fn arms(cli: &Cli, args: &ArmArgs, config: &RobotConfig) -> anyhow::Result<Box<dyn ArmServos>> {
+    if args.arms == ArmKind::Folded {
+        return Ok(Box::new(FoldedArms::new(&config.control.poses)));
+    }
+    let mut settings = ServoSettings::load(&cli.configs)?;
+    if let Some(port) = &args.servo_port {
+        settings.port.clone_from(port);
+    }
+    let zeros = Zeros::load(&args.servo_zeros.clone().unwrap_or_else(default_zeros_file), &settings)?;
+    let driver = start_servos(&settings, &zeros)
+        .context("cannot bring up the arms' servos; without any, say --arms folded")?;
+    Ok(Box::new(BusServos::new(driver, settings.gripper)))
+}
+
+/// Starts the servos' driver; a servo that has just been switched on, or a busy computer, may answer late.
+fn start_servos(settings: &ServoSettings, zeros: &Zeros) -> Result<ServoDriver, ServoError> {
+    let deadline = Instant::now() + SERVO_PATIENCE;
+    loop {
+        match ServoDriver::start(settings, zeros) {
+            Err(error) if Instant::now() < deadline => {
+                tracing::info!("{error}; trying again");
+                std::thread::sleep(SERVO_PAUSE);
+            }
+            result => return result,
+        }
+    }
 }
 
 /// Exchanges damping until the robot has spoken for a while, and looks at the last sample.

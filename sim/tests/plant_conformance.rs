@@ -121,6 +121,29 @@ fn damping_lets_it_down_softly() {
 }
 
 #[test]
+fn arms_and_jaws_go_where_they_are_told() {
+    each("standing", |sut| {
+        let mut wish = stand();
+        run(sut, &wish, 0.3);
+        wish.position[12] = -2.6;
+        wish.position[15] = -2.7;
+        wish.opening = [1.0, 0.5];
+        let last = *run(sut, &wish, 1.5).last().unwrap();
+        let truth = sut.truth();
+        // Servos have no integral part: what gravity bends a stiffness of 5 N m/rad by, and the play of the gears.
+        for (joint, goal) in [(12, -2.6), (15, -2.7)] {
+            let (told, real) = (last.position[joint], truth.joint_position[joint]);
+            assert!((real - goal).abs() < 0.06, "joint {joint}: {real} rad");
+            assert!((told - real).abs() < 0.005, "joint {joint}: {told} rad told, {real} rad real");
+        }
+        for side in 0..2 {
+            assert!((last.opening[side] - wish.opening[side]).abs() < 0.05, "{:?}", last.opening);
+            assert!((truth.opening[side] - wish.opening[side]).abs() < 0.05, "{:?}", truth.opening);
+        }
+    });
+}
+
+#[test]
 fn torques_that_are_asked_for_arrive() {
     each("standing", |sut| {
         run(sut, &stand(), 0.5);

@@ -98,7 +98,8 @@ impl System {
                     None => command.args(["--bind", &self.plant]),
                     Some(wires) => {
                         let faults = wires.faults.iter().flat_map(|fault| ["--fault", fault]);
-                        command.args(["--wires", &wires.board.to_string()]).args(faults)
+                        command.args(["--wires", &wires.board.to_string()]).args(faults);
+                        command.arg("--servos").arg(self.logs.join("servos"))
                     }
                 };
                 command
@@ -110,7 +111,11 @@ impl System {
                     None => command.args(["--plant", "sim", "--sim", &self.plant]),
                     Some(Wires { seen_at, local, .. }) => command
                         .args(["--plant", "go1", "--auto-stand", "true"])
-                        .args(["--go1", &seen_at.to_string(), "--go1-local", &local.to_string()]),
+                        .args(["--go1", &seen_at.to_string(), "--go1-local", &local.to_string()])
+                        .arg("--servo-port")
+                        .arg(self.logs.join("servos/bus"))
+                        .arg("--servo-zeros")
+                        .arg(self.logs.join("servos/zeros.toml")),
                 };
                 command
             }

@@ -47,6 +47,13 @@ fn wired(name: &str, faults: &[&str]) -> (Relay, System, Observer) {
     (relay, system, observer)
 }
 
+/// The robot first: a program without its servos' bus does not start.
+fn start(system: &mut System, observer: &Observer) {
+    system.start(Part::Simulator).unwrap();
+    observer.wait_until("the virtual robot is on", PATIENCE, |seen| seen.truth.is_some()).unwrap();
+    system.start(Part::Robot).unwrap();
+}
+
 /// Kills the robot's program and waits until its sender has ended too; how long the motors were not damped.
 fn kill(system: &mut System, relay: &Relay) -> Duration {
     relay.take();
@@ -65,8 +72,7 @@ fn r_safe_020_it_stands_and_follows_over_the_wires_and_killed_at_any_moment_it_l
     let file = folder.path().join("down_and_up.toml");
     std::fs::write(&file, TRAJECTORY).unwrap();
     let (relay, mut system, observer) = wired("wires", &[]);
-    system.start(Part::Simulator).unwrap();
-    system.start(Part::Robot).unwrap();
+    start(&mut system, &observer);
     observer.wait_until("the robot stands", PATIENCE, standing).unwrap();
     assert!(torso_m(&observer) > 0.2 && !observer.seen().fallen);
 
@@ -101,8 +107,7 @@ fn r_safe_020_it_stands_and_follows_over_the_wires_and_killed_at_any_moment_it_l
 #[test]
 fn r_safe_021_the_remote_controls_stop_ends_in_a_damped_robot_that_says_why() {
     let (relay, mut system, observer) = wired("wires-remote", &["remote-stop@8"]);
-    system.start(Part::Simulator).unwrap();
-    system.start(Part::Robot).unwrap();
+    start(&mut system, &observer);
     observer
         .wait_until("the remote control stops it", PATIENCE, |seen| {
             seen.state.as_ref().is_some_and(|state| {

@@ -7,6 +7,7 @@ pub mod arms;
 mod go1;
 mod health;
 pub mod preflight;
+mod servos;
 mod sim;
 pub mod wire;
 
@@ -14,6 +15,7 @@ pub use arms::ArmServos;
 pub use go1::Go1Plant;
 pub use health::{Health, SustainedPower};
 use serde::{Deserialize, Serialize};
+pub use servos::BusServos;
 pub use sim::SimPlant;
 
 use crate::joints::{JOINTS, JointVector};

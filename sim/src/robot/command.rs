@@ -1,7 +1,7 @@
 //! `locoman-sim robot`.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -9,7 +9,7 @@ use anyhow::Context;
 use locoman_protocol::{Endpoints, Link};
 use triple_buffer::triple_buffer;
 
-use super::board::{self, Host, HostedSetup, Planned};
+use super::board::{self, Host, Planned, VirtualRobot};
 use super::machine::Options;
 use super::publish::publish;
 use super::server::{Counters, serve};
@@ -24,6 +24,10 @@ pub struct Args {
     /// go1 --go1 ADDRESS`.
     #[arg(long, value_name = "ADDRESS", conflicts_with = "bind")]
     pub wires: Option<SocketAddr>,
+    /// With `--wires`: eight virtual servos too, their port at DIR/bus and their zero angles in DIR/zeros.toml, for
+    /// `locoman-robot run --servo-port DIR/bus --servo-zeros DIR/zeros.toml`. Without, the arms stay folded.
+    #[arg(long, value_name = "DIR", requires = "wires")]
+    pub servos: Option<PathBuf>,
     /// With `--wires`: what goes wrong, as NAME=VALUE or NAME=VALUE@SECONDS, such as loss=0.05, jitter-ms=5,
     /// motor-error=3@20, battery-percent=8@20, remote-stop@20; may be given more than once.
     #[arg(long, value_name = "FAULT", requires = "wires")]
@@ -53,7 +57,10 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         seed: args.seed,
         ..Options::default()
     };
-    let HostedSetup { mut robot, mut board, arms } = HostedSetup::new(configs, &options)?;
+    let VirtualRobot { mut robot, mut board, arms } = match &args.servos {
+        None => VirtualRobot::new(configs, &options)?,
+        Some(folder) => with_servos(configs, &options, folder)?,
+    };
     let address = args.wires.unwrap_or(args.bind);
     let socket = UdpSocket::bind(address).with_context(|| {
         format!(
@@ -85,4 +92,13 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         outcome?;
         Ok(published?)
     })
+}
+
+/// A robot with servos; where they are and their zeros are put into the folder.
+fn with_servos(configs: &Path, options: &Options, folder: &Path) -> anyhow::Result<VirtualRobot> {
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let (robot, line) = VirtualRobot::with_servos(configs, options, Some(folder.join("bus")))?;
+    line.zeros.save(&folder.join("zeros.toml"))?;
+    Ok(robot)
 }

@@ -13,6 +13,7 @@ use std::path::Path;
 use locoman_robot::joints::{JOINTS, JointVector, Leg, Side};
 use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Sensors};
+use locoman_robot::servo::{Place, SERVOS};
 use nalgebra::Vector3;
 
 use super::disturbance::{Disturbance, Target};
@@ -23,6 +24,7 @@ use super::scene::{Posture, Scene};
 use super::terrain::Terrain;
 use super::world::{MOTORS, Truth, World};
 use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, body, go1_wire, mjcf};
+use crate::servo_bus::JointMotion;
 
 /// Commands that can be under way at once: more than arrive within the longest latency.
 const COMMANDS_UNDER_WAY: usize = 64;
@@ -221,6 +223,23 @@ impl SimRobot {
     /// Motor torques of the last step, N m.
     pub fn applied_torques(&self) -> &[f64; MOTORS] {
         &self.applied
+    }
+
+    /// What the arms' joints and the jaws do, as their servos measure it before their encoders round it.
+    pub fn servo_motions(&self) -> [JointMotion; SERVOS] {
+        Place::ALL.map(|place| {
+            let motor = if place.is_gripper() { JOINTS + place.side.index() } else { 12 + place.index() };
+            JointMotion {
+                position_rad: self.world.angle(motor),
+                velocity_rad_s: self.world.speed(motor),
+                torque_n_m: self.applied[motor],
+            }
+        })
+    }
+
+    /// The servos hang on a bus of their own: commands are their goals, at once.
+    pub fn leave_bus_to_others(&mut self) {
+        self.drives.servos_mut().leave_bus_to_others();
     }
 
     /// The physics, for tests.

@@ -6,12 +6,11 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use locoman_robot::control::RobotConfig;
 use locoman_robot::go1::{Driver, Go1Settings, WatchdogSettings, driver::Place};
-use locoman_robot::plant::arms::FoldedArms;
-use locoman_robot::plant::{Go1Plant, JointCommand, Plant, PlantError, Sensors};
+use locoman_robot::plant::{BusServos, Go1Plant, JointCommand, Plant, PlantError, Sensors};
+use locoman_robot::servo::{ServoDriver, ServoSettings};
 use locoman_sim::robot::Options;
-use locoman_sim::robot::board::HostedRobot;
+use locoman_sim::robot::board::{HostedRobot, VirtualRobot};
 
 /// Nothing here takes this long unless it hangs.
 pub const WATCHDOG: Duration = Duration::from_secs(20);
@@ -29,7 +28,12 @@ pub struct Wires {
 impl Wires {
     pub fn new(posture: &str) -> Self {
         let options = Options { posture: posture.into(), ..Options::default() };
-        let robot = HostedRobot::start(&configs(), &options).unwrap();
+        let (robot, line) = VirtualRobot::with_servos(&configs(), &options, None).unwrap();
+        let robot = HostedRobot::start(robot, options.seed).unwrap();
+        let servos = ServoSettings { port: line.port, ..ServoSettings::default() };
+        // On a busy machine servos may answer late.
+        let mut tries = std::iter::repeat_with(|| ServoDriver::start(&servos, &line.zeros)).take(20);
+        let arms = BusServos::new(tries.find_map(Result::ok).unwrap(), servos.gripper);
         let default = Go1Settings::default();
         let settings = Go1Settings {
             board: robot.address(),
@@ -39,8 +43,7 @@ impl Wires {
             ..default
         };
         let driver = Driver::start(settings, Place::Thread).unwrap();
-        let poses = RobotConfig::load(&configs()).unwrap().control.poses;
-        Self { plant: Go1Plant::new(driver, Box::new(FoldedArms::new(&poses))), robot }
+        Self { plant: Go1Plant::new(driver, Box::new(arms)), robot }
     }
 
     /// Exchanges for some time; the last sample.

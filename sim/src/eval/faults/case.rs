@@ -137,7 +137,7 @@ pub fn run(case: &Case, configs: &Path, seed: u64) -> anyhow::Result<Vec<Figure>
     let name = |what: &str| format!("{}.{what}", case.name);
     match case.outcome {
         Outcome::GoesOn => {
-            wired.go_to(Mode::RightFoot)?;
+            wired.go_to(Mode::RightGripper)?;
             wired.set_faults((case.faults)());
             follow(&mut wired, GOING_S)?;
             let states = &wired.session().states;

@@ -1,6 +1,6 @@
 //! `wire`: the robot's program over the real robot's datagrams, beside the same motion in lockstep.
 //!
-//! Program, sender and virtual robot run in real time, each as on the robot; an operator moves a front foot and the
+//! Program, sender and virtual robot run in real time, each as on the robot; an operator moves a gripper and the
 //! torso. How even the commands arrive is measured where they arrive: at the virtual board's socket.
 
 mod wired;
@@ -41,13 +41,13 @@ pub fn run(configs: &Path, args: Args, seed: u64) -> anyhow::Result<Report> {
     let mut report = Report::new("wire", seed);
 
     let mut lockstep = Drive::new(configs, &options)?;
-    let script = Script { mode: Mode::RightFoot, seconds: args.seconds.min(LOCKSTEP_S), motion };
+    let script = Script { mode: Mode::RightGripper, seconds: args.seconds.min(LOCKSTEP_S), motion };
     lockstep.run(&script)?;
     let in_process = judge(lockstep.session(), seed);
 
     let mut wired = Wired::start(configs, &options)?;
     wired.stand()?;
-    wired.go_to(Mode::RightFoot)?;
+    wired.go_to(Mode::RightGripper)?;
     wired.forget();
     let heard = follow(&mut wired, args.seconds)?;
     let over_wires = judge(wired.session(), seed);
@@ -66,7 +66,9 @@ pub fn run(configs: &Path, args: Args, seed: u64) -> anyhow::Result<Report> {
         let figure = Figure::new(format!("wires.{name}"), over_wires.value(name).unwrap_or(f64::NAN), "");
         report.push(if name == "falls" { figure.must(Must::AtMost(0.0)) } else { figure });
     }
-    for name in ["foot.position.mean", "torso.position.mean", "torso.rotation.mean"] {
+    for name in
+        ["gripper.position.mean", "gripper.rotation.mean", "torso.position.mean", "torso.rotation.mean"]
+    {
         let of = |report: &Report| report.value(name).unwrap_or(f64::NAN);
         let (wires, lockstep) = (of(&over_wires), of(&in_process));
         let unit = if name.contains("rotation") { "rad" } else { "mm" };
@@ -80,21 +82,29 @@ pub fn run(configs: &Path, args: Args, seed: u64) -> anyhow::Result<Report> {
     Ok(report)
 }
 
-/// Slow enough for a person, fast enough to show a delay: up to 0.06 m/s and 0.1 rad/s.
+/// Slow enough for a person, fast enough to show a delay: up to 0.06 m/s and 0.3 rad/s.
 pub fn motion(t: f64) -> Motion {
     let wave = |period_s: f64| (std::f64::consts::TAU * t / period_s).sin();
     let swing = |period_s: f64| 0.5 - 0.5 * (std::f64::consts::TAU * t / period_s).cos();
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.05 * wave(5.0), 0.05 * wave(7.0)));
     let torso = Isometry3::from_parts(Vector3::new(0.01 * wave(6.0), 0.0, -0.02 * swing(4.0)).into(), turn);
-    let foot = Isometry3::translation(0.04 * swing(4.0), -0.03 * swing(3.0), 0.03 * swing(5.0));
-    Motion { torso: Some(torso), palms: [Some(foot), None], openings: [None; 2] }
+    let palm = Isometry3::from_parts(
+        Vector3::new(0.04 * swing(4.0), -0.03 * swing(3.0), 0.03 * swing(5.0)).into(),
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.2 * wave(4.0), 0.0, 0.2 * wave(5.0))),
+    );
+    Motion { torso: Some(torso), palms: [Some(palm), None], openings: [Some(swing(6.0)), None] }
 }
 
 /// The motion as a command.
 pub fn moved(wish: &OperatorCommand, t: f64) -> OperatorCommand {
     let motion = motion(t);
     let pose = |displacement: &Option<Isometry3<f64>>| displacement.as_ref().map(geometry::pose);
-    OperatorCommand { torso: pose(&motion.torso), right_palm: pose(&motion.palms[0]), ..wish.clone() }
+    OperatorCommand {
+        torso: pose(&motion.torso),
+        right_palm: pose(&motion.palms[0]),
+        right_opening: motion.openings[0],
+        ..wish.clone()
+    }
 }
 
 /// Engages, moves for so long, lets go; what the board heard meanwhile.

@@ -4,6 +4,7 @@
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -15,7 +16,7 @@ use locoman_protocol::pace::Pace;
 use locoman_protocol::{Endpoints, Link, Sender};
 
 use crate::eval::demo::Session;
-use crate::robot::board::{Faults, Heard, HostedRobot};
+use crate::robot::board::{Faults, Heard, HostedRobot, VirtualRobot};
 use crate::robot::{Options, publish};
 
 /// Time between two looks at everything, ns.
@@ -30,6 +31,8 @@ pub struct Wired {
     /// The virtual robot.
     pub robot: HostedRobot,
     configs: PathBuf,
+    /// Where the servos' port and zeros are.
+    servos: PathBuf,
     listen: String,
     local: String,
     program: Option<Child>,
@@ -51,7 +54,12 @@ pub struct Wired {
 impl Wired {
     /// Switches a robot on and starts its program, which stands it up.
     pub fn start(configs: &Path, options: &Options) -> anyhow::Result<Self> {
-        let robot = HostedRobot::start(configs, options)?;
+        let servos = servos_folder();
+        std::fs::create_dir_all(&servos)
+            .with_context(|| format!("cannot make the folder {}", servos.display()))?;
+        let (robot, line) = VirtualRobot::with_servos(configs, options, Some(servos.join("bus")))?;
+        line.zeros.save(&servos.join("zeros.toml"))?;
+        let robot = HostedRobot::start(robot, options.seed)?;
         let listen = format!("tcp/{}", TcpListener::bind("127.0.0.1:0")?.local_addr()?);
         let local = std::net::UdpSocket::bind("127.0.0.1:0")?.local_addr()?.to_string();
         let link = Link::open("locoman", &Endpoints::connect(std::slice::from_ref(&listen)))?;
@@ -64,6 +72,7 @@ impl Wired {
         let mut wired = Self {
             robot,
             configs: configs.to_owned(),
+            servos,
             listen,
             local,
             program: None,
@@ -91,6 +100,10 @@ impl Wired {
             .arg(&self.configs)
             .args(["run", "--plant", "go1", "--auto-stand", "true", "--listen", &self.listen])
             .args(["--go1", &self.robot.address().to_string(), "--go1-local", &self.local])
+            .arg("--servo-port")
+            .arg(self.servos.join("bus"))
+            .arg("--servo-zeros")
+            .arg(self.servos.join("zeros.toml"))
             .stdin(Stdio::null())
             .spawn()
             .with_context(|| {
@@ -221,5 +234,13 @@ impl Drop for Wired {
     fn drop(&mut self) {
         // Already gone is as good.
         let _ = self.kill_program();
+        let _ = std::fs::remove_dir_all(&self.servos);
     }
+}
+
+/// A folder for one robot's servos.
+fn servos_folder() -> PathBuf {
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    std::env::temp_dir().join(format!("locoman-servos-{}-{number}", std::process::id()))
 }

@@ -1,43 +1,77 @@
 //! A virtual Go1 on threads of this process, on a free port: for tests and evaluations, which look behind it.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 
 use locoman_robot::go1::Go1Settings;
 use locoman_robot::plant::JointCommand;
+use locoman_robot::servo::{Place, ServoSettings, Zeros};
 use triple_buffer::{Output, TripleBuffer};
 
-use super::{Faults, Heard, Host, Mainboard, Planned, serve};
+use super::{Faults, Heard, Host, Mainboard, Planned, VirtualArms, serve};
 use crate::robot::machine::{Options, SimRobot};
 use crate::robot::server::Counters;
 use crate::robot::{SimRobotError, Truth};
+use crate::servo_bus::{VirtualBus, VirtualBusSetup};
 
-/// What a board is made of: for those who run [`serve`] themselves.
-pub struct HostedSetup {
+/// What a virtual robot is made of.
+pub struct VirtualRobot {
     /// The machine.
     pub robot: SimRobot,
     /// The board in front of it.
     pub board: Mainboard,
-    /// What the arms hold.
-    pub arms: JointCommand,
+    /// Who says what the arms do.
+    pub arms: VirtualArms,
 }
 
-impl HostedSetup {
-    /// A robot of a configuration folder; its arms hold where they are.
+/// How its servos are reached.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServoLine {
+    /// The port.
+    pub port: String,
+    /// Their zero angles.
+    pub zeros: Zeros,
+}
+
+impl VirtualRobot {
+    /// A robot of a configuration folder whose arms hold where they are.
     pub fn new(configs: &Path, options: &Options) -> anyhow::Result<Self> {
         let mut robot = SimRobot::new(configs, options)?;
-        let mut arms = JointCommand::damping();
-        arms.position = robot.truth().joint_position;
+        let mut held = JointCommand::damping();
+        held.position = robot.truth().joint_position;
         // Zero gains: the servos hold with their own.
-        arms.kd.rows_mut(12, 6).fill(0.0);
-        Ok(Self { robot, board: Mainboard::new(Go1Settings::load(configs)?.feet), arms })
+        held.kd.rows_mut(12, 6).fill(0.0);
+        let board = Mainboard::new(Go1Settings::load(configs)?.feet);
+        Ok(Self { robot, board, arms: VirtualArms::Held(Box::new(held)) })
+    }
+
+    /// The same with servos on a bus, behind a pseudo-terminal that has this name too, if one is given.
+    pub fn with_servos(
+        configs: &Path,
+        options: &Options,
+        link: Option<PathBuf>,
+    ) -> anyhow::Result<(Self, ServoLine)> {
+        let mut virtual_robot = Self::new(configs, options)?;
+        let motions = virtual_robot.robot.servo_motions();
+        let settings = ServoSettings::load(configs)?;
+        let gripper = settings.gripper;
+        let setup = VirtualBusSetup {
+            settings,
+            positions_rad: Place::ALL.map(|place| motions[place.index()].position_rad),
+            link,
+            ..VirtualBusSetup::default()
+        };
+        let bus = VirtualBus::open(&setup)?;
+        let line = ServoLine { port: bus.path().to_owned(), zeros: bus.zeros() };
+        virtual_robot.arms = VirtualArms::Bus { bus, gripper };
+        Ok((virtual_robot, line))
     }
 }
 
-/// The robot; ends when dropped.
+/// A robot that runs; ends when dropped.
 pub struct HostedRobot {
     address: SocketAddr,
     faults: Arc<Mutex<Faults>>,
@@ -50,8 +84,8 @@ pub struct HostedRobot {
 
 impl HostedRobot {
     /// Switches a robot on.
-    pub fn start(configs: &Path, options: &Options) -> anyhow::Result<Self> {
-        let HostedSetup { mut robot, mut board, arms } = HostedSetup::new(configs, options)?;
+    pub fn start(virtual_robot: VirtualRobot, seed: u64) -> std::io::Result<Self> {
+        let VirtualRobot { mut robot, mut board, arms } = virtual_robot;
         let socket = UdpSocket::bind("127.0.0.1:0")?;
         let address = socket.local_addr()?;
         let (faults, counters) = (Arc::new(Mutex::new(Faults::default())), Arc::new(Counters::default()));
@@ -60,7 +94,6 @@ impl HostedRobot {
         let (mut truth_in, truth) = TripleBuffer::new(&None).split();
         let thread = {
             let (faults, counters, stop) = (Arc::clone(&faults), Arc::clone(&counters), Arc::clone(&stop));
-            let seed = options.seed;
             std::thread::Builder::new().name("virtual-go1".into()).spawn(move || {
                 let plan: &[Planned] = &[];
                 let host = Host {

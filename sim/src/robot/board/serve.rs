@@ -13,11 +13,10 @@ use locoman_protocol::clock::monotonic_ns;
 use locoman_protocol::pace::sleep_until;
 use locoman_protocol::realtime;
 use locoman_robot::go1::LowCommand;
-use locoman_robot::plant::JointCommand;
 use triple_buffer::Input;
 
 use super::gauntlet::Gauntlet;
-use super::{Faults, Mainboard, Planned};
+use super::{Faults, Mainboard, Planned, VirtualArms};
 use crate::robot::machine::SimRobot;
 use crate::robot::server::Counters;
 use crate::robot::{SimRobotError, Truth};
@@ -71,7 +70,7 @@ struct Arrival {
 pub fn serve(
     robot: &mut SimRobot,
     board: &mut Mainboard,
-    arms: &JointCommand,
+    arms: &VirtualArms,
     truth: &mut Input<Option<Truth>>,
     host: &Host<'_>,
 ) -> Result<(), SimRobotError> {
@@ -108,7 +107,7 @@ fn receive(host: &Host<'_>, sender: &mpsc::Sender<Arrival>) {
 fn simulate(
     robot: &mut SimRobot,
     board: &mut Mainboard,
-    arms: &JointCommand,
+    arms: &VirtualArms,
     arrivals: &mpsc::Receiver<Arrival>,
     truth: &mut Input<Option<Truth>>,
     host: &Host<'_>,
@@ -120,8 +119,9 @@ fn simulate(
     let mut plan: Vec<Planned> = host.plan.to_vec();
     let mut begin_ns = monotonic_ns();
     robot.set_time_ns(begin_ns);
-    robot.send(&board.joint_command(arms, &Faults::default()), 0);
-    let mut last_error = None;
+    if matches!(arms, VirtualArms::Bus { .. }) {
+        robot.leave_bus_to_others();
+    }
     while !host.stop.load(Ordering::Relaxed) {
         let end_ns = begin_ns + STATE_NS;
         sleep_until(end_ns, 0);
@@ -130,6 +130,9 @@ fn simulate(
             peer = Some(from);
             inwards.enter(&faults, datagram, received_ns);
         }
+        // The servos' goals, and motors that have just failed, do not wait for the next command of the legs.
+        let arms = arms.command(robot);
+        robot.send(&board.joint_command(&arms, &faults), 0);
         while let Some((datagram, due_ns)) = inwards.leave(end_ns) {
             let Some(command) = board.take(&datagram) else {
                 host.counters.malformed.fetch_add(1, Ordering::Relaxed);
@@ -139,12 +142,7 @@ fn simulate(
                 // Nobody listens any more: then nobody is told.
                 let _ = heard.send(Heard { received_ns: due_ns, command: *command });
             }
-            robot.send(&board.joint_command(arms, &faults), due_ns.saturating_sub(begin_ns));
-        }
-        if last_error != faults.motor_error {
-            // A motor that fails does not wait for the next command.
-            last_error = faults.motor_error;
-            robot.send(&board.joint_command(arms, &faults), 0);
+            robot.send(&board.joint_command(&arms, &faults), due_ns.saturating_sub(begin_ns));
         }
         let sensors = robot.advance_by(STATE_NS)?;
         tick_ms = tick_ms.wrapping_add(1);
