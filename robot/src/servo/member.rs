@@ -28,6 +28,8 @@ pub struct Member {
     angles: Angles,
     /// Where the goal stands, rad.
     goal_rad: f64,
+    /// It has been taken hold of and has not come to its goal yet.
+    catching_up: bool,
     /// Share of the permitted current that the command asks for.
     effort: f64,
     /// The goal current that the servo has been told, steps.
@@ -46,6 +48,7 @@ impl Member {
             zero,
             angles: Angles::new(zero, settings.range_rad(place)),
             goal_rad: 0.0,
+            catching_up: true,
             effort: 0.0,
             told_current: 0,
         }
@@ -86,6 +89,7 @@ impl Member {
         self.state.position_rad = self.goal_rad;
         self.state.sample_ns = monotonic_ns();
         (self.told_current, self.effort, self.lost_in_row, self.alert) = (0, 0.0, 0, false);
+        self.catching_up = true;
         self.state.present = true;
         Ok(())
     }
@@ -118,15 +122,19 @@ impl Member {
         if self.effort == 0.0 {
             // Whoever takes hold again begins from where the joint is then.
             self.goal_rad = self.state.position_rad;
+            self.catching_up = true;
             return self.angles.count(self.goal_rad);
         }
-        let step_rad = settings.max_speed_rad_s * elapsed_s;
+        let speed_rad_s = if self.catching_up { settings.catch_up_rad_s } else { settings.max_speed_rad_s };
+        let step_rad = speed_rad_s * elapsed_s;
         let mut wished = self.angles.within_range(command.position_rad);
         if self.place.is_gripper() {
             let lead_rad = settings.gripper.lead_rad;
             wished = wished.clamp(self.state.position_rad - lead_rad, self.state.position_rad + lead_rad);
         }
-        self.goal_rad += (wished - self.goal_rad).clamp(-step_rad, step_rad);
+        let way_rad = wished - self.goal_rad;
+        self.goal_rad += way_rad.clamp(-step_rad, step_rad);
+        self.catching_up &= way_rad.abs() > step_rad;
         let most = settings.motor.stall_torque_n_m;
         let torque = command.torque_n_m + settings.back_emf_n_m_s() * command.velocity_rad_s;
         let offset_rad = torque.clamp(-most, most) / settings.stiffness_n_m_rad(self.place);
@@ -174,5 +182,58 @@ impl Member {
     pub fn lose(&mut self) {
         self.state.lost += 1;
         self.lost_in_row += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::registers::RAD_PER_COUNT;
+
+    /// One cycle, s.
+    const PERIOD_S: f64 = 0.005;
+
+    fn member(place: Place) -> (Member, ServoSettings) {
+        let settings = ServoSettings::default();
+        let zero = Zero { id: settings.id(place), sign: 1, count: 0 };
+        (Member::new(place, zero, &settings), settings)
+    }
+
+    #[test]
+    fn a_servo_that_is_taken_hold_of_comes_slowly_and_follows_fast_from_then_on() {
+        let (mut sut, settings) = member(Place::ALL[0]);
+        let mut way_rad = |to: f64, cycles: usize| {
+            let before = sut.goal_rad;
+            for _ in 0..cycles {
+                sut.goal(&ServoCommand::at(to), &settings, PERIOD_S);
+            }
+            sut.goal_rad - before
+        };
+        assert!((way_rad(1.0, 100) - 0.5).abs() < 1e-9);
+        way_rad(1.0, 101);
+        assert!((way_rad(-1.0, 10) + 0.34).abs() < 1e-9);
+    }
+
+    #[test]
+    fn goals_keep_to_the_joints_range_and_to_what_the_motor_can_do() {
+        let (mut sut, settings) = member(Place::ALL[1]);
+        let most = settings.motor.stall_torque_n_m / settings.stiffness_n_m_rad(sut.place);
+        let strong = ServoCommand { torque_n_m: 1e9, ..ServoCommand::at(1e9) };
+        let mut count = 0;
+        for _ in 0..1000 {
+            count = sut.goal(&strong, &settings, PERIOD_S);
+        }
+        assert!((f64::from(count) * RAD_PER_COUNT - (0.6 + most)).abs() < RAD_PER_COUNT);
+    }
+
+    #[test]
+    fn jaws_that_hold_something_are_not_pressed_beyond_the_lead() {
+        let (mut sut, settings) = member(Place::ALL[6]);
+        sut.state.position_rad = 0.5;
+        let mut count = 0;
+        for _ in 0..1000 {
+            count = sut.goal(&ServoCommand::at(0.02), &settings, PERIOD_S);
+        }
+        assert!((f64::from(count) * RAD_PER_COUNT - 0.3).abs() < RAD_PER_COUNT);
     }
 }

@@ -40,6 +40,8 @@ pub struct ServoSettings {
     pub missing_after: u32,
     /// Goals move no faster, rad/s.
     pub max_speed_rad_s: f64,
+    /// Those of a servo that has just been taken hold of, rad/s.
+    pub catch_up_rad_s: f64,
     /// When a servo is told of.
     pub watch: Watch,
     /// What a motor can do.
@@ -156,6 +158,7 @@ impl Default for ServoSettings {
             watchdog_ms: 100,
             missing_after: 10,
             max_speed_rad_s: 6.8,
+            catch_up_rad_s: 1.0,
             watch: Watch { warm_c: 60.0, min_voltage_v: 9.5, max_voltage_v: 12.6 },
             motor: Motor { stall_torque_n_m: 0.92, stall_current_a: 0.80, no_load_speed_rad_s: 6.8 },
             gains: Gains {
@@ -269,6 +272,7 @@ impl ServoSettings {
             ),
             ((2..=1000).contains(&self.missing_after), "missing_after", "between 2 and 1000"),
             (within(self.max_speed_rad_s, 0.1, 7.0), "max_speed_rad_s", "between 0.1 and 7"),
+            (within(self.catch_up_rad_s, 0.05, 7.0), "catch_up_rad_s", "between 0.05 and 7"),
             (within(self.watch.warm_c, 30.0, 70.0), "watch.warm_c", "between 30 and 70"),
             (
                 within(self.watch.min_voltage_v, 5.5, 14.0)
