@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use locoman_protocol::clock::monotonic_ns;
-use locoman_robot::go1::{LowCommand, MOTORS, asks_for_damping};
+use locoman_robot::go1::{LowCommand, MOTORS, WatchdogSettings, asks_for_damping};
 use locoman_robot::plant::{JointCommand, Plant};
 use locoman_sim::robot::board::{Faults, Heard};
 use wires::{WATCHDOG, Wires, stand};
@@ -20,7 +20,7 @@ fn damped_after(heard: &[Heard], since_ns: u64) -> Option<u64> {
 
 #[test]
 fn r_safe_019_when_the_controller_stalls_the_motors_hold_then_damp_and_stay_damped() {
-    let mut sut = Wires::new("standing");
+    let mut sut = Wires::watched("standing", WatchdogSettings::default());
     let mut moving = stand();
     moving.velocity[0] = 0.01;
     sut.run(&moving, 0.5);

@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use locoman_protocol::realtime;
 use locoman_robot::go1::{Driver, Go1Settings, WatchdogSettings, driver::Place};
 use locoman_robot::plant::{BusServos, Go1Plant, JointCommand, Plant, PlantError, Sensors};
 use locoman_robot::servo::{ServoDriver, ServoSettings};
@@ -26,7 +27,16 @@ pub struct Wires {
 }
 
 impl Wires {
+    /// With a watchdog that is patient with tests on a busy machine.
     pub fn new(posture: &str) -> Self {
+        let watchdog = Go1Settings::default().watchdog;
+        Self::watched(posture, WatchdogSettings { hold_ms: 500.0, damp_ms: 2_000.0, ..watchdog })
+    }
+
+    /// With this watchdog.
+    pub fn watched(posture: &str, watchdog: WatchdogSettings) -> Self {
+        // As the control thread does, where it is permitted.
+        let _granted = realtime::run_before_others();
         let options = Options { posture: posture.into(), ..Options::default() };
         let (robot, line) = VirtualRobot::with_servos(&configs(), &options, None).unwrap();
         let robot = HostedRobot::start(robot, options.seed).unwrap();
@@ -39,7 +49,7 @@ impl Wires {
             board: robot.address(),
             local: "127.0.0.1:0".parse().unwrap(),
             // A thread is waited for while it lingers.
-            watchdog: WatchdogSettings { linger_ms: 500.0, ..default.watchdog },
+            watchdog: WatchdogSettings { linger_ms: 500.0, ..watchdog },
             ..default
         };
         let driver = Driver::start(settings, Place::Thread).unwrap();
