@@ -162,7 +162,7 @@ impl Table {
         if entry.is_kept() && self.get(reg::TORQUE_ENABLE) == 1 {
             return Err(Refusal::Access);
         }
-        let tripped = self.get(reg::BUS_WATCHDOG) == reg::WATCHDOG_TRIPPED.into();
+        let tripped = self.get(reg::BUS_WATCHDOG) == i64::from(reg::WATCHDOG_TRIPPED);
         if !(entry.min..=entry.max).contains(&value) || (tripped && GOALS.contains(&address)) {
             return Err(Refusal::Range);
         }
