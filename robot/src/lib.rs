@@ -20,6 +20,7 @@ pub mod model;
 pub mod modes;
 pub mod plant;
 mod polyhedron;
+pub mod servo;
 pub mod supervisor;
 pub mod trajectory;
 pub mod wbc;

@@ -8,3 +8,4 @@
 pub mod eval;
 pub mod operator;
 pub mod robot;
+pub mod servo_bus;

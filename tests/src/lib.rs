@@ -5,7 +5,9 @@
 
 pub mod observer;
 pub mod programs;
+pub mod relay;
 pub mod system;
 
 pub use observer::Observer;
-pub use system::{Part, System};
+pub use relay::Relay;
+pub use system::{Part, System, Wires};

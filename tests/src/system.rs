@@ -1,6 +1,6 @@
 //! Simulator, robot and station as processes that can be killed and started again.
 
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 
@@ -27,7 +27,30 @@ pub struct System {
     console: String,
     recording: PathBuf,
     logs: PathBuf,
+    wires: Option<Wires>,
     children: [Option<Child>; 3],
+}
+
+/// The real robot's wires in place of the simulator's own.
+#[derive(Debug, Clone)]
+pub struct Wires {
+    /// Where the virtual robot's board listens.
+    pub board: SocketAddr,
+    /// Where the robot's program believes it to be: a relay, or the board itself.
+    pub seen_at: SocketAddr,
+    /// From where the program speaks.
+    pub local: SocketAddr,
+    /// Faults of the virtual robot.
+    pub faults: Vec<String>,
+}
+
+impl Wires {
+    /// Free ports, nothing in between, no faults.
+    pub fn new() -> Result<Self> {
+        let sockets = (0..2).map(|_| UdpSocket::bind("127.0.0.1:0")).collect::<Result<Vec<_>, _>>()?;
+        let (board, local) = (sockets[0].local_addr()?, sockets[1].local_addr()?);
+        Ok(Self { board, seen_at: board, local, faults: Vec::new() })
+    }
 }
 
 impl System {
@@ -43,8 +66,21 @@ impl System {
             console: ports[3].to_string(),
             recording: recording.to_owned(),
             logs: logs.to_owned(),
+            wires: None,
             children: [None, None, None],
         })
+    }
+
+    /// The same over the real robot's wires. The robot stands up by itself.
+    pub fn on_wires(wires: &Wires, logs: &Path) -> Result<Self> {
+        let mut system = Self::new(Path::new("none"), logs)?;
+        system.wires = Some(wires.clone());
+        Ok(system)
+    }
+
+    /// Id of a part's process.
+    pub fn id(&self, part: Part) -> Option<u32> {
+        self.children[part as usize].as_ref().map(Child::id)
     }
 
     /// Where robot and simulator publish.
@@ -57,12 +93,30 @@ impl System {
         let mut command = match part {
             Part::Simulator => {
                 let mut command = program("locoman-sim")?;
-                command.args(["robot", "--bind", &self.plant, "--listen", &self.sim]);
+                command.args(["robot", "--listen", &self.sim]);
+                match &self.wires {
+                    None => command.args(["--bind", &self.plant]),
+                    Some(wires) => {
+                        let faults = wires.faults.iter().flat_map(|fault| ["--fault", fault]);
+                        command.args(["--wires", &wires.board.to_string()]).args(faults);
+                        command.arg("--servos").arg(self.logs.join("servos"))
+                    }
+                };
                 command
             }
             Part::Robot => {
                 let mut command = program("locoman-robot")?;
-                command.args(["run", "--plant", "sim", "--sim", &self.plant, "--listen", &self.robot]);
+                command.args(["run", "--listen", &self.robot]);
+                match &self.wires {
+                    None => command.args(["--plant", "sim", "--sim", &self.plant]),
+                    Some(Wires { seen_at, local, .. }) => command
+                        .args(["--plant", "go1", "--auto-stand", "true"])
+                        .args(["--go1", &seen_at.to_string(), "--go1-local", &local.to_string()])
+                        .arg("--servo-port")
+                        .arg(self.logs.join("servos/bus"))
+                        .arg("--servo-zeros")
+                        .arg(self.logs.join("servos/zeros.toml")),
+                };
                 command
             }
             Part::Station => {

@@ -38,7 +38,7 @@ enum Command {
 
 #[derive(clap::Args)]
 struct EvalArgs {
-    /// Which one: `vision`, `latency`, `tracking`, `workspace`, `robustness`, `loop`; `demo` judges the recording of
+    /// Which one: `vision`, `latency`, `tracking`, `workspace`, `robustness`, `loop`, `wire`, `faults`; `demo` judges the recording of
     /// the last headless demo.
     name: String,
     /// Another seed than the published one.

@@ -14,7 +14,7 @@ use crate::{
     estimator::KinematicEstimator,
     joints::JointVector,
     modes::{self, Choreography, JointGains, Machine, Mode, Phase, Progress, Refusal, Scene, Start},
-    plant::{JointCommand, Sensors},
+    plant::{Health, JointCommand, Sensors},
     supervisor::{Assessment, SensorHealth, Stop, assess},
     wbc::{ContactSet, WbcOutput, WholeBodyController},
 };
@@ -38,6 +38,8 @@ pub struct Inputs {
     pub command: Option<Command>,
     /// The strongest stop asked for so far that was not taken yet.
     pub stop: Stop,
+    /// What the robot says of itself.
+    pub health: Health,
 }
 
 /// The controller.
@@ -144,7 +146,7 @@ impl Controller {
         }
         let state = self.estimator.state(sensors);
 
-        self.latch(inputs.stop);
+        self.latch(inputs);
         let (fresh, grip) = self.listen(now_ns, inputs);
         let assessment = self.assess(now_ns, sensors, SensorHealth::Good, inputs);
         self.decide(now_ns, sensors, &state, inputs, &assessment);
@@ -162,7 +164,7 @@ impl Controller {
 
     /// No sample came. Returns what to send: the last command for a while, then damping.
     pub fn silent(&mut self, now_ns: u64, silent_ns: u64, inputs: &Inputs) -> JointCommand {
-        self.latch(inputs.stop);
+        self.latch(inputs);
         let health = SensorHealth::Silent { for_ns: silent_ns };
         let assessment = assess(&self.config.thresholds, &self.flags(now_ns, 0.0, health, inputs));
         if silent_ns as f64 * 1e-6 >= self.config.thresholds.sensors_lost_ms && !self.lost {
@@ -184,7 +186,7 @@ impl Controller {
 
     /// Sensors that are no numbers: damp, and meet the robot anew after.
     fn refuse_sensors(&mut self, now_ns: u64, inputs: &Inputs) -> JointCommand {
-        self.latch(inputs.stop);
+        self.latch(inputs);
         let flags = self.flags(now_ns, 0.0, SensorHealth::NotFinite, inputs);
         self.snapshot.assessment = assess(&self.config.thresholds, &flags);
         self.snapshot.engagement = 0;

@@ -21,6 +21,7 @@ mod watch;
 pub use compensation::{Compensation, CompensationSettings, LearningSettings};
 pub use controller::{Controller, Inputs, Options};
 pub use run::{Wish, run};
+pub(crate) use settings::read_toml;
 pub use settings::{ConfigError, ControlSettings, RobotConfig};
 pub use snapshot::{BodyState, CommandTrace, Snapshot};
 pub use timing::{Percentiles, SecondHistogram};

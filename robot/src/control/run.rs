@@ -49,7 +49,8 @@ pub fn run(
         };
         let exchanged = plant.exchange(&command);
         let now_ns = monotonic_ns();
-        let inputs = Inputs { command: inbox.command(), stop: inbox.take_stop().max(asked) };
+        let inputs =
+            Inputs { command: inbox.command(), stop: inbox.take_stop().max(asked), health: plant.health() };
         match exchanged {
             Ok(sensors) => {
                 if std::mem::take(&mut silent) {

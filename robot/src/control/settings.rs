@@ -92,22 +92,23 @@ impl RobotConfig {
     pub fn load(configs: &Path) -> Result<Self, ConfigError> {
         let folder = configs.join("robot");
         let file = folder.join("locomotion.toml");
-        let locomotion: LocomotionSettings = read(&file)?;
+        let locomotion: LocomotionSettings = read_toml(&file)?;
         if let Some((key, expected)) = locomotion.flaw() {
             return Err(ConfigError::Value { file, key, expected });
         }
         Ok(Self {
             model: Model::load(&folder)?,
             wbc: WbcSettings::load(&folder.join("wbc.toml"))?,
-            control: read(&folder.join("control.toml"))?,
+            control: read_toml(&folder.join("control.toml"))?,
             locomotion,
-            limits: read(&folder.join("limits.toml"))?,
-            thresholds: read(&folder.join("supervisor.toml"))?,
+            limits: read_toml(&folder.join("limits.toml"))?,
+            thresholds: read_toml(&folder.join("supervisor.toml"))?,
         })
     }
 }
 
-fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
+/// Reads a file of settings; an error names the file and the line.
+pub(crate) fn read_toml<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     let text = std::fs::read_to_string(file)
         .map_err(|source| ConfigError::Read { file: file.to_owned(), source })?;
     toml::from_str(&text)

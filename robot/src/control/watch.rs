@@ -15,8 +15,10 @@ use crate::{
 };
 
 impl Controller {
-    pub(super) fn latch(&mut self, stop: Stop) {
-        self.stop = self.stop.max(stop);
+    /// A stop stays in force, also one of the remote control.
+    pub(super) fn latch(&mut self, inputs: &Inputs) {
+        let remote = if inputs.health.remote_stop { Stop::Damp } else { Stop::None };
+        self.stop = self.stop.max(inputs.stop).max(remote);
     }
 
     /// Takes in the latest command: whether it is new, and what it means.
@@ -49,6 +51,7 @@ impl Controller {
             unloaded_ns: self.unloaded_ns,
             control_fault: self.machine.phase().is_balanced() && self.output.status.fault.is_some(),
             no_ground: self.progress.no_ground,
+            health: inputs.health,
         }
     }
 

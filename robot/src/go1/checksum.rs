@@ -4,8 +4,11 @@
 //! highest bit first. It covers whole words only and leaves the last four bytes out, where it stands. Some
 //! robots (Air, Pro) want it "encrypted": xor with a constant, then rotated. Only the checksum is.
 
+use serde::Deserialize;
+
 /// How the checksum is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Checksum {
     /// As it is: what the maker's library sends to an EDU robot.
     #[default]

@@ -5,7 +5,7 @@
 //! first. The battery's four bytes, one of which switches the robot off, are always written as zero.
 
 use super::{Checksum, DatagramError, HEAD, SLOTS, bytes, checked, checksum};
-use crate::{joints::Leg, plant::JointCommand};
+use crate::joints::Leg;
 
 /// Bytes of a command.
 pub const LENGTH: usize = 614;
@@ -18,7 +18,7 @@ pub const SERVO: u8 = 0x0A;
 /// The motor brakes by itself.
 pub const BRAKE: u8 = 0x00;
 /// Motors of the legs, in the first slots.
-const MOTORS: usize = 3 * Leg::ALL.len();
+pub const MOTORS: usize = 3 * Leg::ALL.len();
 /// "Low level" in the third byte.
 const LOW_LEVEL: u8 = 0xFF;
 /// Where slots begin, and their length.
@@ -110,21 +110,6 @@ impl LowCommand {
     pub fn damping(kd: f32) -> Self {
         let mut command = Self::default();
         command.motors[..MOTORS].fill(MotorCommand::damping(kd));
-        command
-    }
-
-    /// The legs' part of a command.
-    pub fn legs(joints: &JointCommand) -> Self {
-        let mut command = Self::default();
-        for (joint, motor) in command.motors[..MOTORS].iter_mut().enumerate() {
-            *motor = MotorCommand::servo(
-                joints.position[joint] as f32,
-                joints.velocity[joint] as f32,
-                joints.torque[joint] as f32,
-                joints.kp[joint] as f32,
-                joints.kd[joint] as f32,
-            );
-        }
         command
     }
 

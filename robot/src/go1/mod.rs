@@ -1,19 +1,42 @@
-//! The Unitree Go1's low-level datagrams: bytes only, no socket.
+//! The Unitree Go1: its low-level datagrams, and the line that they travel on.
 //!
-//! Little-endian and packed. A command has 614 bytes; a state has 820, of which 807 have a known meaning.
+//! ```text
+//! JointCommand ─► limits ─► driver ══ feed ══► sender: watchdog ─► line ═══ UDP ═══► motor board
+//!      Sensors ◄─ feet ◄───── driver ◄═ feed ═══ sender: sample_clock ◄─ line ◄══ UDP ══════┘
+//!                 controller's process          a process of its own (apart)
+//! ```
+//! The datagrams ([`command`], [`state`], [`checksum`], [`remote`]) are
+//! little-endian and packed. A command has 614 bytes; a state has 820, of which 807 have a known meaning.
 //! Twenty motor slots travel, the first twelve are the legs' joints in the order of [`crate::joints`].
 //! Every datagram ends with a [`checksum`]; what it does not fit is refused before it is looked at.
 
+pub mod apart;
 mod bytes;
 pub mod checksum;
 pub mod command;
+pub mod driver;
+mod feed;
+mod feet;
+mod limits;
+mod line;
 pub mod remote;
+mod sample_clock;
+pub mod sender;
+mod settings;
 pub mod state;
+mod watchdog;
 
 pub use checksum::Checksum;
-pub use command::{LowCommand, MotorCommand};
+pub use command::{LowCommand, MOTORS, MotorCommand};
+pub use driver::Driver;
+pub use feed::Report;
+pub use feet::Feet;
+pub use limits::Limits;
+pub use line::LineCounts;
 pub use remote::Remote;
+pub use settings::Go1Settings;
 pub use state::{Battery, LowState, MotorMode, MotorState};
+pub use watchdog::{Verdict, WatchdogSettings, asks_for_damping};
 
 /// Motor slots of a datagram.
 pub const SLOTS: usize = 20;

@@ -3,10 +3,19 @@
 //! A plant runs the joint law `tau = tau_ff + kp (q_des - q) + kd (dq_des - dq)` by itself, at 2 kHz or
 //! more, as the Go1's motor boards do, and keeps the last command until it gets another.
 
+pub mod arms;
+mod go1;
+mod health;
+pub mod preflight;
+mod servos;
 mod sim;
 pub mod wire;
 
+pub use arms::ArmServos;
+pub use go1::Go1Plant;
+pub use health::{Health, SustainedPower};
 use serde::{Deserialize, Serialize};
+pub use servos::BusServos;
 pub use sim::SimPlant;
 
 use crate::joints::{JOINTS, JointVector};
@@ -111,4 +120,9 @@ pub trait Plant {
     /// In lockstep the plant advances by exactly one control period; on a wire this paces the caller.
     /// On an error the plant keeps its last command, and `exchange` may be called again.
     fn exchange(&mut self, command: &JointCommand) -> Result<Sensors, PlantError>;
+
+    /// What the robot said of itself at the last exchange. One that says nothing is taken to be well.
+    fn health(&self) -> Health {
+        Health::default()
+    }
 }

@@ -8,6 +8,8 @@ mod thresholds;
 pub use severity::{Reason, Reasons, Severity};
 pub use thresholds::Thresholds;
 
+use crate::plant::Health;
+
 /// A stop that somebody asked for. Latched by the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Stop {
@@ -55,6 +57,8 @@ pub struct Flags {
     pub control_fault: bool,
     /// A foot that goes down finds no ground.
     pub no_ground: bool,
+    /// What the robot says of itself.
+    pub health: Health,
 }
 
 /// What must happen, and why.
@@ -78,6 +82,7 @@ pub fn assess(thresholds: &Thresholds, flags: &Flags) -> Assessment {
     let mut verdict = Assessment::default();
     judge_operator(thresholds, flags, &mut verdict);
     judge_robot(thresholds, flags, &mut verdict);
+    judge_health(thresholds, &flags.health, &mut verdict);
     match flags.stop {
         Stop::None => {}
         Stop::Settle => verdict.raise(Severity::LieDown, Reason::StopSettle),
@@ -132,6 +137,47 @@ fn judge_robot(thresholds: &Thresholds, flags: &Flags, verdict: &mut Assessment)
     }
 }
 
+fn judge_health(thresholds: &Thresholds, health: &Health, verdict: &mut Assessment) {
+    if health.remote_stop {
+        verdict.raise(Severity::Damp, Reason::RemoteStop);
+    }
+    if health.sender_damped {
+        verdict.raise(Severity::Damp, Reason::SenderDamped);
+    }
+    if health.motor_fault {
+        verdict.raise(Severity::LieDown, Reason::MotorFault);
+    }
+    if health.leg_power_w >= thresholds.leg_power_w {
+        verdict.raise(Severity::Damp, Reason::Overpowered);
+    }
+    if health.motor_c >= thresholds.motor_damp_c {
+        verdict.raise(Severity::Damp, Reason::MotorHot);
+    } else if health.motor_c >= thresholds.motor_hot_c {
+        verdict.raise(Severity::LieDown, Reason::MotorHot);
+    } else if health.motor_c >= thresholds.motor_warm_c {
+        verdict.raise(Severity::Warn, Reason::MotorWarm);
+    }
+    if health.battery_percent <= thresholds.battery_empty_percent || health.cell_v <= thresholds.cell_empty_v
+    {
+        verdict.raise(Severity::LieDown, Reason::BatteryEmpty);
+    } else if health.battery_percent <= thresholds.battery_low_percent
+        || health.cell_v <= thresholds.cell_low_v
+    {
+        verdict.raise(Severity::Warn, Reason::BatteryLow);
+    }
+    if health.battery_c >= thresholds.battery_hot_c {
+        verdict.raise(Severity::LieDown, Reason::BatteryHot);
+    }
+    if health.servo_fault {
+        verdict.raise(Severity::Disengage, Reason::ServoFault);
+    }
+    if health.servo_c >= thresholds.servo_hot_c {
+        verdict.raise(Severity::Stand, Reason::ServoHot);
+    } else if health.servo_c >= thresholds.servo_warm_c {
+        verdict.raise(Severity::Warn, Reason::ServoWarm);
+    }
+}
+
 fn ms(ns: u64) -> f64 {
     ns as f64 * 1e-6
 }
@@ -154,7 +200,12 @@ mod tests {
             unloaded_ns: 0,
             control_fault: false,
             no_ground: false,
+            health: Health::default(),
         }
+    }
+
+    fn says(health: Health) -> Severity {
+        severity(&Flags { health, ..well() })
     }
 
     fn silent_for(ms: u64) -> Flags {
@@ -216,6 +267,50 @@ mod tests {
     fn r_safe_007_a_stop_outranks_everything_below_it() {
         assert_eq!(severity(&Flags { stop: Stop::Settle, ..silent_for(6_000) }), Severity::LieDown);
         assert_eq!(severity(&Flags { stop: Stop::Damp, ..well() }), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_021_the_remotes_stop_damps_at_once() {
+        assert_eq!(says(Health { remote_stop: true, ..Health::default() }), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_019_motors_that_the_sender_has_damped_are_damped() {
+        assert_eq!(says(Health { sender_damped: true, ..Health::default() }), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_022_a_motor_with_a_fault_lays_the_robot_down() {
+        assert_eq!(says(Health { motor_fault: true, ..Health::default() }), Severity::LieDown);
+    }
+
+    #[test]
+    fn r_safe_023_hot_motors_are_told_then_rest_then_are_damped() {
+        let at = |motor_c| says(Health { motor_c, ..Health::default() });
+        assert_eq!([59.0, 60.0, 69.0].map(at), [Severity::None, Severity::Warn, Severity::Warn]);
+        assert_eq!([70.0, 79.0, 80.0].map(at), [Severity::LieDown, Severity::LieDown, Severity::Damp]);
+    }
+
+    #[test]
+    fn r_safe_024_a_battery_that_runs_low_is_told_and_an_empty_or_hot_one_lays_the_robot_down() {
+        let charge = |battery_percent| says(Health { battery_percent, ..Health::default() });
+        assert_eq!([21.0, 20.0, 10.0].map(charge), [Severity::None, Severity::Warn, Severity::LieDown]);
+        let cell = |cell_v| says(Health { cell_v, ..Health::default() });
+        assert_eq!([3.31, 3.3, 3.1].map(cell), [Severity::None, Severity::Warn, Severity::LieDown]);
+        assert_eq!(says(Health { battery_c: 60.0, ..Health::default() }), Severity::LieDown);
+    }
+
+    #[test]
+    fn r_safe_025_lasting_overload_of_the_legs_damps() {
+        assert_eq!(says(Health { leg_power_w: 999.0, ..Health::default() }), Severity::None);
+        assert_eq!(says(Health { leg_power_w: 1000.0, ..Health::default() }), Severity::Damp);
+    }
+
+    #[test]
+    fn r_safe_026_a_servo_with_a_fault_ends_the_engagement_and_a_hot_one_ends_manipulation() {
+        assert_eq!(says(Health { servo_fault: true, ..Health::default() }), Severity::Disengage);
+        let at = |servo_c| says(Health { servo_c, ..Health::default() });
+        assert_eq!([59.0, 60.0, 68.0].map(at), [Severity::None, Severity::Warn, Severity::Stand]);
     }
 
     #[test]

@@ -51,11 +51,35 @@ pub enum Reason {
     Control,
     /// A foot that goes down finds no ground.
     NoGround,
+    /// The remote control asks for a stop.
+    RemoteStop,
+    /// The sender has damped the motors by itself.
+    SenderDamped,
+    /// A motor does not do what it is told.
+    MotorFault,
+    /// A motor is warm.
+    MotorWarm,
+    /// A motor is too hot.
+    MotorHot,
+    /// The legs work too hard.
+    Overpowered,
+    /// The battery runs low.
+    BatteryLow,
+    /// The battery is empty.
+    BatteryEmpty,
+    /// The battery is too hot.
+    BatteryHot,
+    /// A servo of an arm has an error, or does not answer.
+    ServoFault,
+    /// A servo is warm.
+    ServoWarm,
+    /// A servo is too hot.
+    ServoHot,
 }
 
 impl Reason {
     /// All of them, in order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 26] = [
         Self::NoOperator,
         Self::CommandLate,
         Self::CommandLost,
@@ -70,6 +94,18 @@ impl Reason {
         Self::FootUnloaded,
         Self::Control,
         Self::NoGround,
+        Self::RemoteStop,
+        Self::SenderDamped,
+        Self::MotorFault,
+        Self::MotorWarm,
+        Self::MotorHot,
+        Self::Overpowered,
+        Self::BatteryLow,
+        Self::BatteryEmpty,
+        Self::BatteryHot,
+        Self::ServoFault,
+        Self::ServoWarm,
+        Self::ServoHot,
     ];
 
     /// For people.
@@ -89,6 +125,20 @@ impl Reason {
             Self::FootUnloaded => "a foot that should stand carries nothing",
             Self::Control => "the whole-body controller found no forces",
             Self::NoGround => "the foot finds no ground: still on three feet",
+            Self::RemoteStop => "stopped by the remote control: damped",
+            Self::SenderDamped => {
+                "the sender has damped the motors: the controller was late, or the remote control said so"
+            }
+            Self::MotorFault => "a motor protects itself or does not follow",
+            Self::MotorWarm => "a motor is warm",
+            Self::MotorHot => "a motor is too hot: let it cool",
+            Self::Overpowered => "the legs' motors are overloaded",
+            Self::BatteryLow => "the battery is low",
+            Self::BatteryEmpty => "the battery is empty: charge it",
+            Self::BatteryHot => "the battery is too hot: let it cool",
+            Self::ServoFault => "a servo of an arm has an error or does not answer",
+            Self::ServoWarm => "a servo is warm",
+            Self::ServoHot => "a servo is too hot: let it cool",
         }
     }
 }

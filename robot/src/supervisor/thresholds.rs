@@ -26,6 +26,28 @@ pub struct Thresholds {
     pub foot_unloaded_n: f64,
     /// A source that has been silent for so long may be followed by another.
     pub source_stale_ms: f64,
+    /// A leg's motor as hot as this, °C: tell.
+    pub motor_warm_c: f64,
+    /// ... : lie down.
+    pub motor_hot_c: f64,
+    /// ... : damp.
+    pub motor_damp_c: f64,
+    /// Charge at or below this: tell.
+    pub battery_low_percent: f64,
+    /// ... : lie down.
+    pub battery_empty_percent: f64,
+    /// The weakest cell at or below this, V: tell.
+    pub cell_low_v: f64,
+    /// ... : lie down.
+    pub cell_empty_v: f64,
+    /// The battery as hot as this, °C: lie down.
+    pub battery_hot_c: f64,
+    /// The legs' motors at this power for six samples, W: damp.
+    pub leg_power_w: f64,
+    /// A servo as hot as this, °C: tell.
+    pub servo_warm_c: f64,
+    /// ... : back to four feet.
+    pub servo_hot_c: f64,
 }
 
 impl Default for Thresholds {
@@ -41,6 +63,17 @@ impl Default for Thresholds {
             foot_unloaded_ms: 200.0,
             foot_unloaded_n: 3.0,
             source_stale_ms: 1_000.0,
+            motor_warm_c: 60.0,
+            motor_hot_c: 70.0,
+            motor_damp_c: 80.0,
+            battery_low_percent: 20.0,
+            battery_empty_percent: 10.0,
+            cell_low_v: 3.3,
+            cell_empty_v: 3.1,
+            battery_hot_c: 60.0,
+            leg_power_w: 1_000.0,
+            servo_warm_c: 60.0,
+            servo_hot_c: 68.0,
         }
     }
 }

@@ -6,6 +6,7 @@ pub mod bimanual;
 pub mod body;
 pub mod demo;
 pub mod drive;
+pub mod faults;
 pub mod latency;
 pub mod lockstep;
 pub mod loco_manipulation;
@@ -17,6 +18,7 @@ pub mod statistics;
 pub mod tracking;
 pub mod vision;
 pub mod walking;
+pub mod wire;
 pub mod workspace;
 
 use std::path::{Path, PathBuf};
@@ -50,6 +52,8 @@ pub enum Experiment {
         #[arg(long, value_name = "SESSION")]
         recording: PathBuf,
     },
+    /// Bad lines, failing motors, an empty battery, killed programs: the robot's reactions and their times.
+    Faults(faults::Args),
     /// How punctually a real-time loop with the controller in it wakes up on this machine.
     Loop(punctuality::Args),
     /// The paper's tracking tasks and its square, against the estimator and against the truth.
@@ -64,6 +68,8 @@ pub enum Experiment {
     Bimanual(bimanual::Args),
     /// Walking: pace, pushes, rough ground.
     Walking(walking::Args),
+    /// The robot's program over the real robot's datagrams, beside the same motion in lockstep.
+    Wire(wire::Args),
     /// How much more the arms reach than the feet: the paper's table, in several definitions.
     Workspace,
 }
@@ -75,6 +81,8 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Vision(of) => vision::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Latency(of) => latency::run(configs, *of, args.seed)?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
+        Experiment::Faults(of) => faults::run(configs, *of, args.seed)?,
+        Experiment::Wire(of) => wire::run(configs, *of, args.seed)?,
         Experiment::Loop(of) => punctuality::run(configs, *of, args.seed)?,
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::LocoManipulation(of) => loco_manipulation::run(configs, of, args.seed, plot.as_deref())?,

@@ -13,6 +13,7 @@ use std::path::Path;
 use locoman_robot::joints::{JOINTS, JointVector, Side};
 use locoman_robot::model::Model;
 use locoman_robot::plant::{JointCommand, Sensors};
+use locoman_robot::servo::{Place, SERVOS};
 use nalgebra::Vector3;
 
 use super::disturbance::{Disturbance, Target};
@@ -23,6 +24,7 @@ use super::scene::{Posture, Scene};
 use super::terrain::Terrain;
 use super::world::{MOTORS, Truth, World};
 use super::{EXCHANGE_NS, EXCHANGE_S, SimRobotError, body, go1_wire, mjcf};
+use crate::servo_bus::JointMotion;
 
 /// Commands that can be under way at once: more than arrive within the longest latency.
 const COMMANDS_UNDER_WAY: usize = 64;
@@ -149,7 +151,12 @@ impl SimRobot {
 
     /// Advances by one exchange and measures.
     pub fn advance(&mut self) -> Result<Sensors, SimRobotError> {
-        for _ in 0..self.steps_per_exchange {
+        self.advance_by(EXCHANGE_NS)
+    }
+
+    /// Advances by a time and measures; by whole steps of the physics.
+    pub fn advance_by(&mut self, time_ns: u64) -> Result<Sensors, SimRobotError> {
+        for _ in 0..time_ns / self.step_ns() {
             while self.under_way.front().is_some_and(|(due, _)| *due <= self.step) {
                 self.apply_next();
             }
@@ -200,7 +207,7 @@ impl SimRobot {
 
     /// The sensors' clock now, ns.
     pub fn time_ns(&self) -> u64 {
-        self.epoch_ns + self.step / self.steps_per_exchange * EXCHANGE_NS
+        self.epoch_ns + self.step * EXCHANGE_NS / self.steps_per_exchange
     }
 
     /// Seconds since time zero.
@@ -216,6 +223,23 @@ impl SimRobot {
     /// Motor torques of the last step, N m.
     pub fn applied_torques(&self) -> &[f64; MOTORS] {
         &self.applied
+    }
+
+    /// What the arms' joints and the jaws do, as their servos measure it before their encoders round it.
+    pub fn servo_motions(&self) -> [JointMotion; SERVOS] {
+        Place::ALL.map(|place| {
+            let motor = if place.is_gripper() { JOINTS + place.side.index() } else { 12 + place.index() };
+            JointMotion {
+                position_rad: self.world.angle(motor),
+                velocity_rad_s: self.world.speed(motor),
+                torque_n_m: self.applied[motor],
+            }
+        })
+    }
+
+    /// The servos hang on a bus of their own: commands are their goals, at once.
+    pub fn leave_bus_to_others(&mut self) {
+        self.drives.servos_mut().leave_bus_to_others();
     }
 
     /// The physics, for tests.

@@ -8,6 +8,7 @@
 //! What a profile of the scene file makes imperfect: the masses (`body`), friction and play (`mjcf`), the feet
 //! (`rubber`), the servos (`servo`), the wire (`go1_wire`), the sensors (`noise`).
 
+pub mod board;
 pub mod body;
 pub mod command;
 pub mod disturbance;

@@ -97,6 +97,12 @@ impl Servos {
         }
     }
 
+    /// Goals and readings pass at once from now on: they have had a bus already.
+    pub fn leave_bus_to_others(&mut self) {
+        self.errors.bus_period_s = 0.0;
+        self.bus_steps = 1;
+    }
+
     /// What the controller knows of a servo: what the bus brought last; the present without a period.
     pub fn reading(&mut self, servo: usize, world: &World) -> Reading {
         if self.errors.bus_period_s > 0.0 { self.readings[servo] } else { self.read(servo, world) }

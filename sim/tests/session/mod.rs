@@ -72,7 +72,7 @@ impl Session {
             operator.received_ns = self.time_ns;
             operator.sequence += 1;
         }
-        let inputs = Inputs { command: self.operator, stop };
+        let inputs = Inputs { command: self.operator, stop, ..Inputs::default() };
         self.command = self.controller.tick(self.time_ns, &sensors, &inputs);
         self.truth = self.plant.truth();
         let tilt = (self.truth.world_from_torso.rotation * Vector3::z()).z.clamp(-1.0, 1.0).acos();
