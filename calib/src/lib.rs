@@ -5,3 +5,4 @@
 //! files that others made (OpenCV's coefficients in a rig file) are used as they are.
 
 pub mod check;
+pub mod print;
