@@ -1,0 +1,28 @@
+//! The program's subcommands, one file each: its arguments and what it prints.
+//!
+//! To add one: a file with `Args` and `run`, and a variant of [`Command`].
+
+mod check;
+
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+
+/// What the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check a rig file and a shells file, and say what is in them.
+    Check(check::Args),
+}
+
+/// Runs a command; `configs` is the folder of rigs and shells.
+pub fn run(command: &Command, configs: &Path) -> anyhow::Result<()> {
+    match command {
+        Command::Check(args) => check::run(args, configs),
+    }
+}
+
+/// The file that was named, or the default one of the configs folder.
+fn or_default(path: Option<&Path>, configs: &Path, default: &str) -> PathBuf {
+    path.map_or_else(|| configs.join(default), Path::to_owned)
+}
