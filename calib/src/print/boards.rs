@@ -3,12 +3,12 @@
 use locoman_vision::shells::design::MARGIN_FACTOR;
 
 use super::PrintError;
-use super::drawing::{Drawing, Mark, TagPlace};
+use super::drawing::{Drawing, Mark, Page, TagPlace};
 use super::ruler;
 use super::spec::{Board, Checkerboard, Paper};
 
 /// The page of an AprilTag grid and where its tags lie on it. Numbers rise to the right, then upwards.
-pub fn grid(board: &Board, paper: &Paper) -> Result<(Drawing, Vec<TagPlace>), PrintError> {
+pub fn grid(board: &Board, paper: &Paper) -> Result<Page, PrintError> {
     let pitch_mm = board.tag_mm + board.gap_mm;
     let extent_mm = |count: u32| f64::from(count - 1) * pitch_mm + board.tag_mm * MARGIN_FACTOR;
     let (width_mm, height_mm) = (extent_mm(board.columns), extent_mm(board.rows));
@@ -29,12 +29,12 @@ pub fn grid(board: &Board, paper: &Paper) -> Result<(Drawing, Vec<TagPlace>), Pr
         board.columns, board.rows, board.tag_mm, board.gap_mm, board.first_id
     );
     finish(&mut page, paper, &words);
-    Ok((page, tags))
+    Ok(Page { drawing: page, tags })
 }
 
 /// The page of a checkerboard with tags and where its tags lie on it. The upper left square is black; numbers rise
 /// to the right, then downwards.
-pub fn checkerboard(board: &Checkerboard, paper: &Paper) -> Result<(Drawing, Vec<TagPlace>), PrintError> {
+pub fn checkerboard(board: &Checkerboard, paper: &Paper) -> Result<Page, PrintError> {
     let side_mm = board.square_mm;
     let (width_mm, height_mm) = (f64::from(board.columns) * side_mm, f64::from(board.rows) * side_mm);
     let (mut page, [left, top]) = place("checkerboard", width_mm, height_mm, paper)?;
@@ -63,7 +63,7 @@ pub fn checkerboard(board: &Checkerboard, paper: &Paper) -> Result<(Drawing, Vec
         board.columns, board.rows, board.tag_mm, board.first_id
     );
     finish(&mut page, paper, &words);
-    Ok((page, tags))
+    Ok(Page { drawing: page, tags })
 }
 
 /// Draws tags, each with its number in small type outside its white cell.
@@ -109,4 +109,18 @@ fn place(
 fn finish(page: &mut Drawing, paper: &Paper, words: &str) {
     let bottom = page.size_mm[1] - paper.margin_mm - ruler::HEIGHT_MM + 2.0;
     ruler::draw(page, [paper.margin_mm, bottom], words);
+}
+
+/// The board file that belongs to a grid: what calibration commands read.
+pub fn board_file(board: &Board) -> String {
+    format!(
+        "# The board of `locoman-calib print board`. Measure the print: if its rulers are off, so are these numbers.\n\
+         # tag_size: side of a black square; spacing: white between black squares; both in metres\n\
+         family = \"tag36h11\"\ncolumns = {}\nrows = {}\nfirst_id = {}\ntag_size = {}\nspacing = {}\n",
+        board.columns,
+        board.rows,
+        board.first_id,
+        board.tag_mm / 1e3,
+        board.gap_mm / 1e3
+    )
 }

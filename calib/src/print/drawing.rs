@@ -16,6 +16,15 @@ pub struct Drawing {
     pub marks: Vec<Mark>,
 }
 
+/// A page and where its tags lie on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page {
+    /// What is printed.
+    pub drawing: Drawing,
+    /// Its tags.
+    pub tags: Vec<TagPlace>,
+}
+
 /// Ink.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {

@@ -10,7 +10,7 @@ use locoman_vision::shells::Shell;
 use nalgebra::{Point2, Point3, Rotation2, Vector2, Vector3};
 
 use super::PrintError;
-use super::drawing::{Drawing, LineKind, Mark, TagPlace};
+use super::drawing::{Drawing, LineKind, Mark, Page, TagPlace};
 use super::facets::{Facet, Kind};
 use super::ruler;
 use super::spec::{Paper, Spec};
@@ -42,7 +42,7 @@ impl Flat {
 }
 
 /// The pages of a shell's nets, and where the tags lie on each.
-pub fn pages(shell: &Shell, spec: &Spec) -> Result<Vec<(Drawing, Vec<TagPlace>)>, PrintError> {
+pub fn pages(shell: &Shell, spec: &Spec) -> Result<Vec<Page>, PrintError> {
     let kind = Kind::of(shell).ok_or_else(|| PrintError::UnknownShell { name: shell.name.clone() })?;
     let facets = kind.facets(spec);
     let pieces: Vec<Piece> = trees(kind).iter().map(|tree| Piece::new(&facets, tree, shell)).collect();
@@ -248,7 +248,7 @@ fn page(
     corners: &[[f64; 2]],
     size_mm: [f64; 2],
     paper: &Paper,
-) -> Result<(Drawing, Vec<TagPlace>), PrintError> {
+) -> Result<Page, PrintError> {
     let mut page = Drawing::new(size_mm);
     let mut places = Vec::new();
     for (piece, [left, top]) in pieces.iter().zip(corners) {
@@ -275,5 +275,5 @@ fn page(
     let bottom = size_mm[1] - paper.margin_mm - ruler::HEIGHT_MM + 2.0;
     let words = format!("{}: cut, fold back, glue the flaps", shell.name);
     ruler::draw(&mut page, [paper.margin_mm, bottom], &words);
-    Ok((page, places))
+    Ok(Page { drawing: page, tags: places })
 }

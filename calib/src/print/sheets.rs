@@ -4,7 +4,7 @@ use locoman_vision::shells::Shell;
 use locoman_vision::shells::design::MARGIN_FACTOR;
 
 use super::PrintError;
-use super::drawing::{Drawing, LineKind, TagPlace};
+use super::drawing::{Drawing, LineKind, Page, TagPlace};
 use super::ruler;
 use super::spec::Paper;
 
@@ -15,7 +15,7 @@ const TEXT_MM: f64 = 2.2;
 /// The pages of a shell's stickers, and where the tags lie on each.
 ///
 /// Each sticker is a tag with its white margin of one cell, cutting lines all round, its number below.
-pub fn pages(shell: &Shell, paper: &Paper) -> Result<Vec<(Drawing, Vec<TagPlace>)>, PrintError> {
+pub fn pages(shell: &Shell, paper: &Paper) -> Result<Vec<Page>, PrintError> {
     let sticker_mm = |size_m: f64| 1e3 * size_m * MARGIN_FACTOR;
     let largest_mm = shell.tags.iter().map(|tag| sticker_mm(tag.size_m)).fold(0.0, f64::max);
     let pitch_mm = largest_mm + GAP_MM;
@@ -55,7 +55,7 @@ pub fn pages(shell: &Shell, paper: &Paper) -> Result<Vec<(Drawing, Vec<TagPlace>
             let bottom = paper.height_mm - paper.margin_mm - ruler::HEIGHT_MM + 2.0;
             let words = format!("{}: cut along the lines; glue upright", shell.name);
             ruler::draw(&mut page, [paper.margin_mm, bottom], &words);
-            Ok((page, places))
+            Ok(Page { drawing: page, tags: places })
         })
         .collect()
 }

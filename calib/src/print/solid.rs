@@ -160,7 +160,7 @@ fn plate(shell: &Shell, spec: &Spec) -> Result<Mesh, PrintError> {
     let normals: Vec<Vector3<f64>> =
         (0..3).map(|k| (front[k + 1] - front[k]).cross(&Vector3::z()).normalize()).collect();
     // Parallel to the front; at the bends along the line that halves the angle.
-    let back: Vec<Vector3<f64>> = (0..4)
+    let back: Vec<Vector3<f64>> = (0..4_usize)
         .map(|k| {
             let (before, after) = (normals[k.saturating_sub(1)], normals[k.min(2)]);
             front[k] - (before + after) * (wall_mm / (1.0 + before.dot(&after)))
