@@ -4,6 +4,7 @@ pub mod board;
 pub mod bundle;
 pub mod check;
 pub mod chessboard;
+pub mod exchange;
 pub mod file;
 pub mod intrinsics;
 pub mod pnp;

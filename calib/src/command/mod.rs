@@ -3,6 +3,8 @@
 //! To add one: a file with `Args` and `run`, and a variant of [`Command`].
 
 mod check;
+mod export;
+mod import;
 mod print;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +16,10 @@ use clap::Subcommand;
 pub enum Command {
     /// Check a rig file and a shells file, and say what is in them.
     Check(check::Args),
+    /// Write a rig (and a board) in a format of others: Kalibr, ROS.
+    Export(export::Args),
+    /// Make a rig or board file from one of others: ZED, Kalibr, OpenCV, ROS.
+    Import(import::Args),
     /// Print boards, tag sheets and shells: SVG and PDF at true scale, STL, and the files that describe them.
     Print(print::Args),
 }
@@ -22,6 +28,8 @@ pub enum Command {
 pub fn run(command: &Command, configs: &Path) -> anyhow::Result<()> {
     match command {
         Command::Check(args) => check::run(args, configs),
+        Command::Export(args) => export::run(args),
+        Command::Import(args) => import::run(args),
         Command::Print(args) => print::run(args, configs),
     }
 }

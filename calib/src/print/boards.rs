@@ -5,7 +5,8 @@ use locoman_vision::shells::design::MARGIN_FACTOR;
 use super::PrintError;
 use super::drawing::{Drawing, Mark, Page, TagPlace};
 use super::ruler;
-use super::spec::{Board, Checkerboard, Paper};
+use super::spec::{Checkerboard, Paper};
+use crate::board::Board;
 
 /// The page of an AprilTag grid and where its tags lie on it. Numbers rise to the right, then upwards.
 pub fn grid(board: &Board, paper: &Paper) -> Result<Page, PrintError> {
@@ -111,16 +112,11 @@ fn finish(page: &mut Drawing, paper: &Paper, words: &str) {
     ruler::draw(page, [paper.margin_mm, bottom], words);
 }
 
-/// The board file that belongs to a grid: what calibration commands read.
+/// The file that describes a grid to the calibration commands, which read it from the file of dimensions too.
 pub fn board_file(board: &Board) -> String {
     format!(
-        "# The board of `locoman-calib print board`. Measure the print: if its rulers are off, so are these numbers.\n\
-         # tag_size: side of a black square; spacing: white between black squares; both in metres\n\
-         family = \"tag36h11\"\ncolumns = {}\nrows = {}\nfirst_id = {}\ntag_size = {}\nspacing = {}\n",
-        board.columns,
-        board.rows,
-        board.first_id,
-        board.tag_mm / 1e3,
-        board.gap_mm / 1e3
+        "# The printed grid, millimetres. Measure the print: if its rulers are off, so are these numbers.\n[board]\n\
+         columns = {}\nrows = {}\nfirst_id = {}\ntag_mm = {}\ngap_mm = {}\n",
+        board.columns, board.rows, board.first_id, board.tag_mm, board.gap_mm
     )
 }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use locoman_vision::shells::design::{Dimensions, EDGE_PER_INRADIUS, MARGIN_FACTOR};
 use serde::Deserialize;
 
+use crate::board::Board;
+
 /// All dimensions; millimetres.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,18 +45,6 @@ pub struct Sticker {
     pub thickness_mm: f64,
     pub clearance_mm: f64,
     pub engraving_mm: f64,
-}
-
-/// An AprilTag grid.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "names say it; the file explains")]
-pub struct Board {
-    pub columns: u32,
-    pub rows: u32,
-    pub first_id: u32,
-    pub tag_mm: f64,
-    pub gap_mm: f64,
 }
 
 /// A checkerboard with tags in its white squares.
