@@ -254,10 +254,10 @@ mod tests {
         let (path, text) = file();
         let cases = [
             ("gap_mm = 9.2", "gap_mm = 5.0", "board.gap_mm = 5, tags of 27.2 mm need 6.80 mm"),
-            ("tag_mm = 25.0", "tag_mm = 32.0", "palm: a tag takes 40.40 mm"),
+            ("tag_mm = 25.0", "tag_mm = 32.0", "palm: a tag takes 40.20 mm"),
             ("wall_mm = 2.4", "wall_mm = -2.4", "palm.wall_mm = -2.4"),
             ("columns = 7", "columns = 0", "without columns"),
-            ("rows = 5", "rwos = 5", "print.toml:26: unknown field `rwos`"),
+            ("rows = 5", "rwos = 5", "print.toml:20: unknown field `rwos`"),
         ];
         for (good, bad, expected) in cases {
             assert!(text.contains(good), "{good}");
