@@ -72,9 +72,9 @@ impl Chessboard {
         )? {
             return Ok(None);
         }
-        // The window of OpenCV's own sample.
+        // Half the side of a small square: a larger window sees the neighbours of far boards.
         let stop = TermCriteria { typ: 3, max_count: 30, epsilon: 0.01 };
-        imgproc::corner_sub_pix(&mat, &mut corners, Size::new(11, 11), Size::new(-1, -1), stop)?;
+        imgproc::corner_sub_pix(&mat, &mut corners, Size::new(5, 5), Size::new(-1, -1), stop)?;
         Ok(Some(corners))
     }
 }

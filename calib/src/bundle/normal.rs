@@ -16,7 +16,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::term::{Linear, WIDTH};
 
-/// Keeps an instant solvable of which everything was set aside: information of a deviation of a kilometre.
+/// Keeps solvable what nothing is left to be said of, for all of it was set aside: information of a deviation of a
+/// kilometre, or of a thousand radians.
 const LEAST: f64 = 1e-6;
 
 /// JᵀJ summed up, and the gradient.
@@ -198,7 +199,7 @@ impl Factors {
             size => {
                 let mut schur = normal.corner.clone();
                 for k in 0..size {
-                    schur[(k, k)] *= 1.0 + damping;
+                    schur[(k, k)] = schur[(k, k)] * (1.0 + damping) + LEAST;
                 }
                 schur.fill_lower_triangle_with_upper_triangle();
                 schur.gemm(-1.0, &edge, &edge.transpose(), 1.0);

@@ -17,9 +17,9 @@ use super::term::{self, Linear};
 /// How the adjustment works.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Up to this share of χ² above its median a sighting counts in full (2.5: what chance exceeds once in 50).
+    /// A sighting counts in full up to the mean of its χ² and so many of its standard deviations.
     pub kernel: f64,
-    /// Beyond this many times the median a sighting is set aside (8: what chance never exceeds),
+    /// Beyond so many it is set aside: what chance never does,
     pub outlier: f64,
     /// unless its points are nearer than this, pixels.
     pub outlier_floor_px: f64,
@@ -36,8 +36,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            kernel: 2.5,
-            outlier: 8.0,
+            kernel: 3.0,
+            outlier: 20.0,
             outlier_floor_px: 0.1,
             rounds: 3,
             steps: 60,
@@ -204,7 +204,7 @@ impl Work {
 
     /// Huber's loss of a χ² and its weight.
     fn robust(&self, chi2: f64, rows: usize) -> (f64, f64) {
-        let kernel = self.settings.kernel * self.level * rows as f64;
+        let kernel = self.level * above_mean(rows, self.settings.kernel);
         if chi2 <= kernel {
             (0.5 * chi2, 1.0)
         } else {
@@ -290,7 +290,7 @@ impl Work {
             .map(|sighting| {
                 let Some(residuals) = term::residuals_px(problem, sighting) else { return true };
                 let points = problem.points(sighting).len();
-                let limit = self.settings.outlier * self.level * (2 * points) as f64;
+                let limit = self.level * above_mean(2 * points, self.settings.outlier);
                 let far2 = residuals.iter().map(|r| r * r).sum::<f64>() / points as f64;
                 term::chi2(sighting, &residuals) > limit && far2 > self.settings.outlier_floor_px.powi(2)
             })
@@ -327,21 +327,26 @@ impl Work {
 /// χ² of a part that the state does not show to the camera.
 const UNSEEN_CHI2: f64 = 1e8;
 
-/// The median χ² per degree of freedom of what is used, as far as it is above nothing.
+/// The χ² of some degrees of freedom that lies so many standard deviations above the mean.
+fn above_mean(rows: usize, sigmas: f64) -> f64 {
+    rows as f64 + sigmas * (2.0 * rows as f64).sqrt()
+}
+
+/// The χ² per degree of freedom of what is used, as its median tells: 1 if stated deviations are right.
 fn level(problem: &Problem) -> f64 {
-    /// Median of χ² per degree of freedom, about: 0.92 of eight, 0.69 of two.
-    const MEDIAN: f64 = 0.9;
     let used = problem.sightings.iter().filter(|sighting| !sighting.outlier);
     let ratio = |sighting| {
         let rows = 2.0 * problem.points(sighting).len() as f64;
-        term::residuals_px(problem, sighting).map_or(UNSEEN_CHI2, |r| term::chi2(sighting, &r)) / rows
+        // Wilson and Hilferty's median of χ².
+        let median = rows * (1.0 - 2.0 / (9.0 * rows)).powi(3);
+        term::residuals_px(problem, sighting).map_or(UNSEEN_CHI2, |r| term::chi2(sighting, &r)) / median
     };
     let mut ratios: Vec<f64> = used.map(ratio).collect();
     let middle = ratios.len() / 2;
     if ratios.is_empty() {
         return 1.0;
     }
-    (*ratios.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN).max(1e-12)
+    ratios.select_nth_unstable_by(middle, f64::total_cmp).1.max(1e-12)
 }
 
 /// Root mean square of the lengths of used points' errors, and their number.

@@ -24,7 +24,7 @@ pub(super) fn places(
         .collect();
     let shared = |a: usize, b: usize| -> Vec<Isometry3<f64>> {
         let pair = |(t, pose): &(f64, Isometry3<f64>)| {
-            let other = interpolated(&timed[b], *t + 1e-6, MOST_GAP_S)?;
+            let other = interpolated(&timed[b], *t, MOST_GAP_S)?;
             Some(pose * other.inverse())
         };
         timed[a].iter().filter_map(pair).collect()

@@ -52,15 +52,21 @@ pub(super) fn sights(
     sights
 }
 
-/// The pose between two neighbours in time that are at most `most_gap_s` apart.
+/// The pose at a time, or between two neighbours in time that are at most `most_gap_s` apart.
 pub(super) fn interpolated(
     sights: &[(f64, Isometry3<f64>)],
     time_s: f64,
     most_gap_s: f64,
 ) -> Option<Isometry3<f64>> {
+    /// Exposed together, though written down a little apart.
+    const SAME_S: f64 = 1e-3;
     let after = sights.partition_point(|(t, _)| *t < time_s);
-    let late = sights.get(after)?;
-    let early = sights.get(after.checked_sub(1)?)?;
+    let (late, early) = (sights.get(after), after.checked_sub(1).and_then(|before| sights.get(before)));
+    let same = |sight: &&(f64, Isometry3<f64>)| (sight.0 - time_s).abs() <= SAME_S;
+    if let Some(sight) = late.filter(same).or(early.filter(same)) {
+        return Some(sight.1);
+    }
+    let (late, early) = (late?, early?);
     let gap_s = late.0 - early.0;
     if gap_s > most_gap_s {
         return None;

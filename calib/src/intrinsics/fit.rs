@@ -121,8 +121,11 @@ fn start(
 ) -> Result<(Problem, Vec<usize>), IntrinsicsError> {
     /// Focal lengths in units of the image's longer side: from fisheyes to telephoto lenses.
     const FOCALS: [f64; 8] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8];
+    /// Views that are enough to tell them apart.
+    const FEW: usize = 16;
+    let few: Vec<usize> = chosen.iter().copied().step_by(chosen.len().div_ceil(FEW)).collect();
     let longer = f64::from(settings.width.max(settings.height));
-    let mut best: Option<(f64, Problem, Vec<usize>)> = None;
+    let mut best: Option<(f64, Camera)> = None;
     for focal in FOCALS {
         let camera = Camera {
             id: settings.id.clone(),
@@ -134,8 +137,8 @@ fn start(
             world_from_camera: Isometry3::identity(),
             line_time_s: 0.0,
         };
-        let (mut problem, kept) = posed(views, chosen, target, &camera);
-        if kept.len() < LEAST_VIEWS.max(chosen.len() / 2) {
+        let (mut problem, kept) = posed(views, &few, target, &camera);
+        if kept.len() < LEAST_VIEWS.max(few.len() / 2) {
             continue;
         }
         problem.eyes[0].loose.intrinsics[0] = bundle::FREE;
@@ -145,13 +148,13 @@ fn start(
             bundle::Settings { rounds: 1, steps: 12, outlier: f64::INFINITY, ..bundle::Settings::default() };
         let outcome = bundle::adjust(&mut problem, &quick, &mut |_, _| {});
         let sane = problem.eyes[0].camera.focal_px.iter().all(|f| (0.1..20.0).contains(&(f / longer)));
-        let merit = outcome.rms_px * (chosen.len() as f64 / kept.len() as f64);
-        if sane && merit.is_finite() && best.as_ref().is_none_or(|(known, ..)| merit < *known) {
-            best = Some((merit, problem, kept));
+        let merit = outcome.rms_px * (few.len() as f64 / kept.len() as f64);
+        if sane && merit.is_finite() && best.as_ref().is_none_or(|(known, _)| merit < *known) {
+            best = Some((merit, problem.eyes[0].camera.clone()));
         }
     }
-    let (_, problem, kept) = best.ok_or(IntrinsicsError::NoStart { views: chosen.len() })?;
-    Ok((problem, kept))
+    let (_, camera) = best.ok_or(IntrinsicsError::NoStart { views: chosen.len() })?;
+    Ok(posed(views, chosen, target, &camera))
 }
 
 /// A problem in which each view has the pose that PnP gives; views without are left out.

@@ -123,7 +123,8 @@ impl TagFinding {
     /// Not of the size that the file says.
     pub fn missized(&self) -> bool {
         let (scale, sigma) = self.scale;
-        self.images >= LEAST_IMAGES && (scale - 1.0).abs() > MISSIZED.max(SIGMAS * sigma)
+        // Of a tag that was not seen the deviation is beyond all measure.
+        (scale - 1.0).abs() > MISSIZED.max(SIGMAS * sigma)
     }
 
     /// Often does not fit: torn, bent, or its number is also elsewhere.
