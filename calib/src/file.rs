@@ -3,8 +3,13 @@
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a file beside its place and renames it into it; makes the folder.
-pub fn write_whole(path: &Path, contents: impl AsRef<[u8]>) -> std::io::Result<()> {
+/// Writes a text beside its place and renames it into it; makes the folder.
+pub fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
+    write_bytes_whole(path, text.as_bytes())
+}
+
+/// [`write_whole`] of bytes.
+pub fn write_bytes_whole(path: &Path, contents: &[u8]) -> std::io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder)?;
@@ -13,7 +18,7 @@ pub fn write_whole(path: &Path, contents: impl AsRef<[u8]>) -> std::io::Result<(
     name.push(format!(".{}.part", std::process::id()));
     let beside = path.with_file_name(name);
     let written = std::fs::File::create(&beside).and_then(|mut file| {
-        file.write_all(contents.as_ref())?;
+        file.write_all(contents)?;
         file.sync_all()
     });
     let placed = written.and_then(|()| std::fs::rename(&beside, path));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use locoman_calib::file::write_whole;
+use locoman_calib::file::write_bytes_whole;
 use locoman_calib::print::drawing::{Drawing, Page};
 use locoman_calib::print::spec::Spec;
 use locoman_calib::print::{boards, net, pdf, sheets, solid, svg};
@@ -75,7 +75,7 @@ fn write_pages(out: &Path, name: &str, pages: &[Page]) -> anyhow::Result<()> {
 
 fn write(out: &Path, name: &str, contents: impl AsRef<[u8]>) -> anyhow::Result<()> {
     let path = out.join(name);
-    write_whole(&path, contents)
+    write_bytes_whole(&path, contents.as_ref())
         .with_context(|| format!("cannot write {}; check --out and its permissions", path.display()))?;
     println!("{}", path.display());
     Ok(())
