@@ -1,5 +1,7 @@
 //! Calibrations of others: golden files, whose heads name their sources, round trips, and what is said of bad files.
 
+#![expect(clippy::expect_used, reason = "helpers of tests: a panic there is the report")]
+
 use std::path::{Path, PathBuf};
 
 use locoman_calib::board::Board;

@@ -1,5 +1,7 @@
 //! The shells' STL files, judged by an independent reader of STL and by rays.
 
+#![expect(clippy::expect_used, reason = "helpers of tests: a panic there is the report")]
+
 use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::Path;

@@ -1,6 +1,8 @@
 //! Printed pages, judged on paper: the SVG and PDF files themselves are rasterised at 300 dpi, and the upstream
 //! library looks for the tags.
 
+#![expect(clippy::expect_used, reason = "helpers of tests: a panic there is the report")]
+
 mod raster;
 
 use std::path::Path;
