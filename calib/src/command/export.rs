@@ -48,7 +48,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     for (name, text) in files {
         let path = args.out.join(name);
-        write_whole(&path, text).with_context(|| format!("cannot write {}; check --out", path.display()))?;
+        write_whole(&path, &text).with_context(|| format!("cannot write {}; check --out", path.display()))?;
         println!("{}", path.display());
     }
     Ok(())
