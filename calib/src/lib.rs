@@ -1,7 +1,28 @@
 //! Calibration of cameras, rigs and shells.
 //!
-//! What stands today: [`check`] reads rig and shells files as the tracker does, and says what is in them.
-//! Intrinsics, extrinsics, shell geometry, printable boards, import and export come with issues of their own;
-//! files that others made (OpenCV's coefficients in a rig file) are used as they are.
+//! ```text
+//! recording, pictures ─► reading ─► observations ─┬─► intrinsics ─┐
+//!                        (our detector)           ├─► extrinsics ─┼─► bundle ─► rig and shells files,
+//! board, shells files ────────────────────────────┼─► layout ─────┤  (one       verdicts in words
+//!                                                 └─► inspect ────┘   solver)
+//! ```
+//!
+//! [`check`] says what is in rig and shells files as the tracker reads them. Conventions: those of
+//! [`locoman_vision`]; rotations are perturbed on the right.
 
+pub mod board;
+pub mod bundle;
 pub mod check;
+pub mod chessboard;
+pub mod exchange;
+pub mod extrinsics;
+pub mod file;
+pub mod inspect;
+pub mod intrinsics;
+pub mod layout;
+pub mod pnp;
+pub mod print;
+pub mod projection;
+pub mod reading;
+pub mod rehearsal;
+pub mod toml_out;

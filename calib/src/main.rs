@@ -1,12 +1,12 @@
 //! `locoman-calib`: calibration of cameras, rigs and shells.
 
-use std::path::{Path, PathBuf};
+mod command;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use locoman_calib::check;
-use locoman_vision::rig::Rig;
-use locoman_vision::shells::ShellSet;
+use clap::Parser;
+use command::Command;
 use tracing_subscriber::EnvFilter;
 
 /// Calibration of cameras, rigs and shells.
@@ -23,19 +23,6 @@ struct Cli {
     command: Command,
 }
 
-#[derive(Debug, Subcommand)]
-enum Command {
-    /// Check a rig file and a shells file, and say what is in them.
-    Check {
-        /// The rig file; by default `rigs/two_zed_pairs.toml` of the configs folder.
-        #[arg(long, value_name = "FILE")]
-        rig: Option<PathBuf>,
-        /// The shells file; by default `shells/standard.toml` of the configs folder.
-        #[arg(long, value_name = "FILE")]
-        shells: Option<PathBuf>,
-    },
-}
-
 fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -50,17 +37,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     let filter = EnvFilter::try_new(&cli.log)
         .map_err(|error| anyhow::anyhow!("--log {}: {error}; try `info` or `debug`", cli.log))?;
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    let Command::Check { rig, shells } = &cli.command;
-    let or_default =
-        |path: &Option<PathBuf>, default: &str| path.clone().unwrap_or_else(|| cli.configs.join(default));
-    check_files(&or_default(rig, "rigs/two_zed_pairs.toml"), &or_default(shells, "shells/standard.toml"))
-}
-
-fn check_files(rig: &Path, shells: &Path) -> anyhow::Result<()> {
-    let (cameras, worn) = (Rig::load(rig)?, ShellSet::load(shells)?);
-    println!("{}\n{}", rig.display(), check::describe_rig(&cameras));
-    println!("{}\n{}", shells.display(), check::describe_shells(&worn));
-    Ok(())
+    command::run(&cli.command, &cli.configs)
 }
 
 #[expect(clippy::print_stderr, reason = "the one report at the edge of the program")]

@@ -119,8 +119,8 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PoseEntry {
-    xyz: [f64; 3],
-    quat: [f64; 4],
+    pub xyz: [f64; 3],
+    pub quat: [f64; 4],
 }
 
 impl PoseEntry {

@@ -1,5 +1,8 @@
 //! The rig: the calibrated cameras of a room, as a rig file (TOML) describes them.
 
+mod calibration;
+mod text;
+
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +13,8 @@ use toml::Spanned;
 use crate::camera::{Camera, Distortion};
 use crate::config::{ConfigError, Fault, PoseEntry, Source};
 
+pub use calibration::Calibration;
+
 /// The cameras of a room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
@@ -19,6 +24,25 @@ pub struct Rig {
     pub sources: Vec<CameraSource>,
     /// Cameras with the same number are exposed together; as many as there are cameras.
     pub sync_groups: Vec<usize>,
+    /// The serial number of each camera, where the file tells it; as many as there are cameras.
+    pub serials: Vec<Option<String>>,
+    /// When and how well all of it was calibrated, if the file tells.
+    pub calibration: Option<Calibration>,
+}
+
+/// Another camera stands where a calibrated one should.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "camera `{id}` was calibrated with serial number {calibrated}, {found} is connected\n  hint: connect that one, or \
+     calibrate this one: no two lenses are alike"
+)]
+pub struct SerialMismatch {
+    /// The camera's id.
+    pub id: String,
+    /// Whose numbers the file has.
+    pub calibrated: String,
+    /// What is connected.
+    pub found: String,
 }
 
 /// Where the images of a camera come from when it is live.
@@ -53,7 +77,20 @@ impl Rig {
     pub fn new(cameras: Vec<Camera>) -> Self {
         let sources = vec![CameraSource::default(); cameras.len()];
         let sync_groups = vec![0; cameras.len()];
-        Self { cameras, sources, sync_groups }
+        let serials = vec![None; cameras.len()];
+        Self { cameras, sources, sync_groups, serials, calibration: None }
+    }
+
+    /// Refuses a camera that is not the one that was calibrated; cameras without a serial number in the file pass.
+    pub fn check_serial(&self, camera: usize, found: &str) -> Result<(), SerialMismatch> {
+        match self.serials.get(camera) {
+            Some(Some(calibrated)) if calibrated != found => Err(SerialMismatch {
+                id: self.cameras[camera].id.clone(),
+                calibrated: calibrated.clone(),
+                found: found.to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Reads and checks a rig file.
@@ -68,6 +105,7 @@ impl Rig {
 
     fn from_source(source: &Source) -> Result<Self, ConfigError> {
         let file: RigFile = source.parse()?;
+        let hash = calibration::numbers_hash(file.camera.iter().map(Spanned::get_ref));
         let mut rig = Self::new(Vec::new());
         let mut ids = HashSet::new();
         let mut group_names: Vec<String> = Vec::new();
@@ -78,6 +116,7 @@ impl Rig {
                 group_names.push(entry.sync.clone());
                 group_names.len() - 1
             });
+            let serial = entry.serial.clone();
             let (camera, live) = entry.check().map_err(|fault| source.error(offset, fault))?;
             if !ids.insert(camera.id.clone()) {
                 let problem = format!("camera id `{}` is used twice", camera.id);
@@ -86,10 +125,17 @@ impl Rig {
             rig.cameras.push(camera);
             rig.sources.push(live);
             rig.sync_groups.push(sync_group);
+            rig.serials.push(serial);
         }
         if rig.cameras.is_empty() {
             let fault = Fault::new("no camera", "add a [[camera]] table for each camera");
             return Err(source.error(0, fault));
+        }
+        if let Some(calibration) = file.calibration {
+            let offset = calibration.span().start;
+            let calibration = calibration.into_inner();
+            calibration.check(&hash, calibration::today()).map_err(|fault| source.error(offset, fault))?;
+            rig.calibration = Some(calibration);
         }
         Ok(rig)
     }
@@ -98,10 +144,12 @@ impl Rig {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RigFile {
+    calibration: Option<Spanned<Calibration>>,
     #[serde(default)]
     camera: Vec<Spanned<CameraEntry>>,
 }
 
+/// A camera as its file has it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraEntry {
@@ -120,11 +168,12 @@ struct CameraEntry {
     line_time_us: f64,
     #[serde(default)]
     sync: String,
+    serial: Option<String>,
     #[serde(default)]
     source: CameraSource,
 }
 
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Model {
     Pinhole,
@@ -289,6 +338,37 @@ source = { device = "/dev/video0", half = "left" }
             let message = complaint(&GOOD.replace(good, bad));
             assert!(message.contains(expected) && message.contains("hint: "), "{message}");
         }
+    }
+
+    #[test]
+    fn a_calibration_that_is_stale_or_of_other_numbers_is_refused_with_the_reason() {
+        let mut rig = load(GOOD).expect("valid");
+        rig.calibration = Some(Calibration::of_today(Some(0.21)));
+        rig.serials = vec![Some("SN1".to_owned())];
+        let text = rig.to_toml();
+        let again = load(&text).expect("of today");
+        let stated = again.calibration.clone().expect("written");
+        assert_eq!((stated.rms_px, &again.serials), (Some(0.21), &rig.serials));
+        assert!(stated.hash.is_some());
+        assert!(again.check_serial(0, "SN1").is_ok());
+        let other = again.check_serial(0, "SN2").expect_err("another camera").to_string();
+        assert!(other.contains("SN1") && other.contains("SN2 is connected"), "{other}");
+        let changed = complaint(&text.replace("fx = 700", "fx = 701"));
+        assert!(changed.contains("rig.toml:1: cameras were changed after their calibration"), "{changed}");
+        let date = rig.calibration.and_then(|calibration| calibration.date).expect("today");
+        let old =
+            complaint(&text.replace(&date, "2020-02-29").replace("rms_px", "max_age_days = 90\nrms_px"));
+        assert!(old.contains("calibration of 2020-02-29 is") && old.contains("meant for 90"), "{old}");
+        assert!(complaint(&text.replace(&date, "2020-02")).contains("is no day"));
+    }
+
+    #[test]
+    fn what_is_written_is_read_again_as_it_was() {
+        let rig = load(GOOD).expect("valid");
+        let again = load(&rig.to_toml()).expect("valid");
+        assert_eq!(again.cameras[0].distortion, rig.cameras[0].distortion);
+        assert_eq!(again.cameras[0].line_time_s, rig.cameras[0].line_time_s);
+        assert_eq!(again.cameras[0].world_from_camera, rig.cameras[0].world_from_camera);
     }
 
     #[test]

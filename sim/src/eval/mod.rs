@@ -4,6 +4,7 @@
 
 pub mod bimanual;
 pub mod body;
+pub mod calibration;
 pub mod demo;
 pub mod drive;
 pub mod faults;
@@ -44,6 +45,8 @@ pub struct Args {
 pub enum Experiment {
     /// Poses from rendered images against the truth.
     Vision(vision::Args),
+    /// Lenses, rigs and shells found from scratch, against the truth; real pictures beside OpenCV and TagSLAM.
+    Calibration(calibration::Args),
     /// From images in memory to poses published, by the station's threads in real time.
     Latency(latency::Args),
     /// A recorded session of the demo: following, latency, control period.
@@ -79,6 +82,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
     let plot = args.json.as_ref().map(|json| json.with_extension("svg"));
     let report = match &args.experiment {
         Experiment::Vision(of) => vision::run(configs, of, args.seed, plot.as_deref())?,
+        Experiment::Calibration(of) => calibration::run(of, args.seed)?,
         Experiment::Latency(of) => latency::run(configs, *of, args.seed)?,
         Experiment::Demo { recording } => demo::run(recording, args.seed)?,
         Experiment::Faults(of) => faults::run(configs, *of, args.seed)?,

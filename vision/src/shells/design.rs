@@ -19,20 +19,39 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 
 use super::{Shell, ShellSet, ShellTag};
 
-/// Black square of a palm tag, metres.
-pub const PALM_TAG_M: f64 = 0.025;
-/// Distance of the palm's facets from its origin, metres.
-pub const PALM_INRADIUS_M: f64 = 0.045;
-/// Black square of a thumb tag, metres.
-pub const THUMB_TAG_M: f64 = 0.014;
-/// Distance of the thumb's facets from its origin, metres.
-pub const THUMB_INRADIUS_M: f64 = 0.0215;
-/// Black square of a torso tag, metres.
-pub const TORSO_TAG_M: f64 = 0.055;
-/// Side of the square that a torso tag with its margin gets on the plate, metres.
-pub const TORSO_FACET_M: f64 = 0.072;
-/// How far the torso's side columns are bent back, radians (35 degrees).
-pub const TORSO_BEND_RAD: f64 = 0.610_865;
+/// What the shells are drawn from: metres and radians. The default is the standard shells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dimensions {
+    /// Black square of a palm tag.
+    pub palm_tag_m: f64,
+    /// Distance of the palm's facets from its origin.
+    pub palm_inradius_m: f64,
+    /// Black square of a thumb tag.
+    pub thumb_tag_m: f64,
+    /// Distance of the thumb's facets from its origin.
+    pub thumb_inradius_m: f64,
+    /// Black square of a torso tag.
+    pub torso_tag_m: f64,
+    /// Side of the square that a torso tag with its margin gets on the plate.
+    pub torso_facet_m: f64,
+    /// How far the torso's side columns are bent back.
+    pub torso_bend_rad: f64,
+}
+
+impl Default for Dimensions {
+    fn default() -> Self {
+        Self {
+            palm_tag_m: 0.025,
+            palm_inradius_m: 0.045,
+            thumb_tag_m: 0.014,
+            thumb_inradius_m: 0.0215,
+            torso_tag_m: 0.055,
+            torso_facet_m: 0.072,
+            // 35 degrees.
+            torso_bend_rad: 0.610_865,
+        }
+    }
+}
 
 /// Side of a tag with its white margin of one cell, per side of its black square of eight cells.
 pub const MARGIN_FACTOR: f64 = 10.0 / 8.0;
@@ -42,6 +61,12 @@ pub const EDGE_PER_INRADIUS: f64 = 2.0 / (1.0 + SQRT_2);
 
 /// The standard shells.
 pub fn standard() -> ShellSet {
+    draw(&Dimensions::default())
+}
+
+/// Shells of these dimensions, numbered from 0: torso, palms, thumbs; the right one first.
+pub fn draw(dimensions: &Dimensions) -> ShellSet {
+    let Dimensions { palm_tag_m, thumb_tag_m, torso_tag_m, .. } = *dimensions;
     let mut next_id = 0..;
     let mut shell = |name: &str, size_m: f64, facets: Vec<Isometry3<f64>>| Shell {
         name: name.to_owned(),
@@ -52,27 +77,31 @@ pub fn standard() -> ShellSet {
             .collect(),
     };
     let shells = vec![
-        shell("torso", TORSO_TAG_M, torso()),
-        shell("right_palm", PALM_TAG_M, palm(1.0)),
-        shell("left_palm", PALM_TAG_M, palm(-1.0)),
-        shell("right_thumb", THUMB_TAG_M, thumb(1.0)),
-        shell("left_thumb", THUMB_TAG_M, thumb(-1.0)),
+        shell("torso", torso_tag_m, torso(dimensions)),
+        shell("right_palm", palm_tag_m, palm(dimensions.palm_inradius_m, 1.0)),
+        shell("left_palm", palm_tag_m, palm(dimensions.palm_inradius_m, -1.0)),
+        shell("right_thumb", thumb_tag_m, thumb(dimensions.thumb_inradius_m, 1.0)),
+        shell("left_thumb", thumb_tag_m, thumb(dimensions.thumb_inradius_m, -1.0)),
     ];
     ShellSet { family: "tag36h11".to_owned(), shells }
 }
 
 /// Dome round z without the belt's facet towards the wrist (-x), the fifth of the belt.
-fn palm(side: f64) -> Vec<Isometry3<f64>> {
+fn palm(inradius_m: f64, side: f64) -> Vec<Isometry3<f64>> {
     const WRIST: usize = 4;
-    let mut facets = dome(PALM_INRADIUS_M, side, &Matrix3::identity());
+    let mut facets = dome(inradius_m, side, &Matrix3::identity());
     facets.remove(WRIST);
     facets
 }
 
 /// Dome round x; the belt starts at the nail (z).
-fn thumb(side: f64) -> Vec<Isometry3<f64>> {
-    let thumb_from_dome = Matrix3::from_columns(&[Vector3::z(), Vector3::y() * -1.0, Vector3::x()]);
-    dome(THUMB_INRADIUS_M, side, &thumb_from_dome)
+fn thumb(inradius_m: f64, side: f64) -> Vec<Isometry3<f64>> {
+    dome(inradius_m, side, &thumb_from_dome())
+}
+
+/// Rotation from the frame of a dome (its axis z) to that of a thumb; a palm's frame is the dome's own.
+pub fn thumb_from_dome() -> Matrix3<f64> {
+    Matrix3::from_columns(&[Vector3::z(), Vector3::y() * -1.0, Vector3::x()])
 }
 
 /// Upper half of a rhombicuboctahedron: a belt of eight facets, four slanted by 45 degrees, one on top.
@@ -97,11 +126,11 @@ fn dome(inradius_m: f64, side: f64, shell_from_dome: &Matrix3<f64>) -> Vec<Isome
 }
 
 /// Columns from the wearer's right to left, in each the lower row first.
-fn torso() -> Vec<Isometry3<f64>> {
-    let half = TORSO_FACET_M / 2.0;
+fn torso(dimensions: &Dimensions) -> Vec<Isometry3<f64>> {
+    let half = dimensions.torso_facet_m / 2.0;
     let mut facets = Vec::new();
     for column in [-1.0, 0.0, 1.0] {
-        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), column * TORSO_BEND_RAD);
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), column * dimensions.torso_bend_rad);
         // From the middle of the plate to the bend, then half a facet along the bent part.
         let center = column * (Vector3::y() * half + turn * Vector3::y() * half);
         for row in [-1.0, 1.0] {
@@ -220,12 +249,13 @@ mod tests {
         }
     }
 
-    /// Tags with their margin fit their facets.
-    const _: () = {
-        assert!(PALM_TAG_M * MARGIN_FACTOR < PALM_INRADIUS_M * EDGE_PER_INRADIUS);
-        assert!(THUMB_TAG_M * MARGIN_FACTOR < THUMB_INRADIUS_M * EDGE_PER_INRADIUS);
-        assert!(TORSO_TAG_M * MARGIN_FACTOR < TORSO_FACET_M);
-    };
+    #[test]
+    fn tags_with_their_margin_fit_their_facets() {
+        let sut = Dimensions::default();
+        assert!(sut.palm_tag_m * MARGIN_FACTOR < sut.palm_inradius_m * EDGE_PER_INRADIUS);
+        assert!(sut.thumb_tag_m * MARGIN_FACTOR < sut.thumb_inradius_m * EDGE_PER_INRADIUS);
+        assert!(sut.torso_tag_m * MARGIN_FACTOR < sut.torso_facet_m);
+    }
 
     #[test]
     fn every_tag_looks_outwards() {
