@@ -14,7 +14,7 @@ use crate::eval::walking::tilt;
 use crate::robot::{EXCHANGE_S, Options};
 
 /// The modes.
-const MODES: [Mode; 10] = [
+const MODES: [Mode; 11] = [
     Mode::Stance,
     Mode::Foot(Right),
     Mode::Foot(Left),
@@ -24,6 +24,7 @@ const MODES: [Mode; 10] = [
     Mode::LocoManipulation(Arms::One(Right)),
     Mode::LocoManipulation(Arms::One(Left)),
     Mode::LocoManipulation(Arms::Both),
+    Mode::Bimanual,
     Mode::LieDown,
 ];
 /// Longest time on the way from one to another, s.
