@@ -226,3 +226,48 @@ fn sample(image: &GrayImage, at: &Point2<f64>) -> Option<f64> {
     let below = value(1, 0) * (1.0 - u) + value(1, 1) * u;
     Some(above * (1.0 - v) + below * v)
 }
+
+#[cfg(test)]
+mod tests {
+    use locoman_vision::detect::tag_bitmap;
+
+    use super::*;
+    use crate::board::Board;
+
+    /// Pixels a cell of a drawn tag.
+    const CELL: u32 = 4;
+
+    /// A flat picture of a board, seen straight on.
+    fn drawn(board: &Board) -> GrayImage {
+        let pitch = 10 * CELL + 8;
+        let (width, height) = (board.columns * pitch + 40, board.rows * pitch + 40);
+        let mut pixels = vec![255; (width * height) as usize];
+        for k in 0..board.columns * board.rows {
+            let tag = tag_bitmap(board.first_id + k).expect("a code");
+            let (left, top) =
+                (20 + k % board.columns * pitch, 20 + (board.rows - 1 - k / board.columns) * pitch);
+            for y in 0..10 * CELL {
+                for x in 0..10 * CELL {
+                    let value = tag.row(y / CELL)[(x / CELL) as usize];
+                    pixels[((top + y) * width + left + x) as usize] = value;
+                }
+            }
+        }
+        GrayImage::new(width, height, pixels).expect("size")
+    }
+
+    #[test]
+    fn a_board_is_read_and_a_mirrored_print_is_named() {
+        let board = Board { columns: 4, rows: 3, first_id: 100, tag_mm: 30.0, gap_mm: 10.0 };
+        let (image, body) = (drawn(&board), board.to_shell());
+        let views = read_pictures(&[("one".into(), image.clone())], &body).expect("read");
+        assert_eq!(views[0].parts.len(), 12);
+        assert!(views[0].blur_px.is_some_and(|blur| blur < 3.0), "{:?}", views[0].blur_px);
+        let mirrored = mirrored(&image).expect("size");
+        let error = read_pictures(&[("one".into(), mirrored)], &body).expect_err("mirrored").to_string();
+        assert!(error.contains("mirrored") && error.contains("12 in 1"), "{error}");
+        let other = Board { first_id: 300, ..board }.to_shell();
+        let error = read_pictures(&[("one".into(), image)], &other).expect_err("others").to_string();
+        assert!(error.contains("numbers 300 to 311"), "{error}");
+    }
+}
