@@ -93,7 +93,7 @@ fn recording(args: &Args, rig: &Path, configs: &Path) -> anyhow::Result<()> {
     let body = board(args, configs)?.to_shell();
     let bar = progress("images");
     let seen = reading::read_recording(&args.input, &rig, &body, args.stride, &mut |done| {
-        bar.set_position(done as u64)
+        bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
     let target = Part::tags_of(&body);

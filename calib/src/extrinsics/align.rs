@@ -2,10 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+/// A measured point and the drawn one.
+pub type Pair = (Point3<f64>, Point3<f64>);
+
 /// `drawn_from_measured`: minimises the sum of the distances (not of their squares) of pairs of (measured, drawn) points.
 ///
 /// `None` of fewer than three pairs.
-pub fn align(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
+pub fn align(pairs: &[Pair]) -> Option<Isometry3<f64>> {
     const ROUNDS: usize = 60;
     /// Nearer than this all count alike, m: otherwise one perfect pair would weigh everything.
     const FLOOR_M: f64 = 2e-5;
@@ -24,9 +27,9 @@ pub fn align(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
 }
 
 /// Least squares (Kabsch, 1976).
-fn weighted(pairs: &[(Point3<f64>, Point3<f64>)], weights: &[f64]) -> Option<Isometry3<f64>> {
+fn weighted(pairs: &[Pair], weights: &[f64]) -> Option<Isometry3<f64>> {
     let total: f64 = weights.iter().sum();
-    let mean = |of: fn(&(Point3<f64>, Point3<f64>)) -> Vector3<f64>| {
+    let mean = |of: fn(&Pair) -> Vector3<f64>| {
         pairs.iter().zip(weights).map(|(pair, weight)| of(pair) * *weight).sum::<Vector3<f64>>() / total
     };
     let (from, to) = (mean(|pair| pair.0.coords), mean(|pair| pair.1.coords));
