@@ -48,7 +48,6 @@ pub fn run(configs: &Path, args: Args, seed: u64) -> anyhow::Result<Report> {
     let mut wired = Wired::start(configs, &options)?;
     wired.stand()?;
     wired.go_to(Mode::RightGripper)?;
-    wired.forget();
     let heard = follow(&mut wired, args.seconds)?;
     let over_wires = judge(wired.session(), seed);
 
