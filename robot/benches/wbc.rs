@@ -92,7 +92,7 @@ fn time_dynamics(clock: u64) {
 fn time_forces(scene: &Scene, clock: u64) {
     let problems = problems(scene);
     let at = |step: u32| &problems[step as usize % problems.len()];
-    let feet = problems[0].feet;
+    let feet = problems[0].points;
     let mut forces = [0.0; MAX_FORCES];
     let mut sut = ActiveSet::default();
     let times = timed(clock, |step| {

@@ -84,6 +84,9 @@ fn effect(dynamics: &Dynamics, objective: &Objective, motion: &Motion) -> Vector
         Objective::FootPosition(leg, _) => (Frame::Foot(*leg), 0),
         Objective::GripperPosition(side, _) => (Frame::Gripper(*side), 0),
         Objective::GripperOrientation(side, _) => (Frame::Gripper(*side), 3),
+        Objective::LegPosture(leg, _) => {
+            return motion.fixed_rows::<3>(6 + leg.first_joint()).into_owned();
+        }
         Objective::ArmPosture(side, _) => {
             return motion.fixed_rows::<3>(6 + side.first_arm_joint()).into_owned();
         }
@@ -319,6 +322,7 @@ fn moved(objective: &Objective, by: Vector3<f64>) -> Objective {
         Objective::TorsoPosition(reference)
         | Objective::FootPosition(_, reference)
         | Objective::GripperPosition(_, reference)
+        | Objective::LegPosture(_, reference)
         | Objective::ArmPosture(_, reference) => reference.position += by,
         Objective::TorsoOrientation(reference) | Objective::GripperOrientation(_, reference) => {
             reference.orientation = UnitQuaternion::from_scaled_axis(10.0 * by) * reference.orientation;

@@ -37,7 +37,10 @@ pub fn standing() -> Vec<Case> {
         stance: stance.to_vec(),
         objectives: objectives.to_vec(),
     };
-    let rows = rows.map(|row| of(format!("{:?}", row.mode), row.stance, row.objectives));
+    let rows = rows.map(|row| {
+        let stance: Vec<Leg> = row.contacts().legs().collect();
+        of(format!("{:?}", row.mode), &stance, row.objectives)
+    });
     let trots = PAIRS.iter().map(|pair| of(format!("trot on {pair:?}"), pair, STANCE.objectives));
     rows.chain(trots).collect()
 }
@@ -172,6 +175,10 @@ pub fn objectives(
             ObjectiveKind::GripperOrientation(side) => {
                 Objective::GripperOrientation(side, rotation(random, Frame::Gripper(side)))
             }
+            ObjectiveKind::LegPosture(leg) => {
+                let joints = state.position.fixed_rows::<3>(leg.first_joint()).into_owned();
+                Objective::LegPosture(leg, point(random, joints))
+            }
             ObjectiveKind::ArmPosture(side) => {
                 let arm = state.position.fixed_rows::<3>(side.first_arm_joint()).into_owned();
                 Objective::ArmPosture(side, point(random, arm))
@@ -182,7 +189,7 @@ pub fn objectives(
 
 /// The feet in full contact, or now and then one of them half loaded.
 pub fn contacts(random: &mut Random, stance: &[Leg]) -> ContactSet {
-    let contacts = ContactSet::of(stance);
+    let contacts = stance.iter().fold(ContactSet::NOTHING, |contacts, leg| contacts.with_share(*leg, 1.0));
     let first = stance[0];
     if random.number() < 0.8 { contacts } else { contacts.with_share(first, 0.05 + 0.95 * random.share()) }
 }
