@@ -8,6 +8,7 @@
 //!                          ├─────────────────────────────────────┘           │ ▼             │
 //!                          └────────────────── lower foot ◄───────────────── stow ◄──────────┘
 //! ```
+//! From stance also, and back: unfold ─► walk, or walk and hold ─► halt; kneel ─► sit up ─► bimanual ─► sit down ─► get up.
 //! What the whole-body controller tracks in each of them is a row of a [`table`].
 //! [`Machine`] decides, and is a pure function of its state and inputs; [`Choreography`] moves, and where the
 //! operator moves, [`Driving`] does.

@@ -91,7 +91,7 @@ pub fn run(args: &Args, configs: &Path) -> anyhow::Result<()> {
         Experiment::Robustness(of) => robustness::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::LocoManipulation(of) => loco_manipulation::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Modes(of) => modes::run(configs, of, args.seed)?,
-        Experiment::Bimanual(of) => bimanual::run(configs, of, args.seed)?,
+        Experiment::Bimanual(of) => bimanual::run(configs, of, args.seed, plot.as_deref())?,
         Experiment::Walking(of) => walking::run(configs, of, args.seed)?,
         Experiment::Workspace => workspace::run(configs, args.seed, plot.as_deref())?,
         Experiment::Tracking(of) => tracking::run(configs, of, args.seed, plot.as_deref())?,

@@ -1,10 +1,12 @@
 //! `bimanual`: sits up on its shanks, works with both grippers, is pushed, reaches up, and comes down again. By the
 //! simulator's truth, with all imperfections on, each robot on a floor of its own.
 
+mod film;
 mod trial;
 
 use std::path::Path;
 
+use anyhow::Context;
 use rayon::prelude::*;
 
 use super::statistics::{mean, percentile};
@@ -22,12 +24,16 @@ pub struct Args {
     pub profile: String,
 }
 
-/// Runs the experiment on all cores.
-pub fn run(configs: &Path, args: &Args, seed: u64) -> anyhow::Result<Report> {
+/// Runs the experiment on all cores; draws the first robot on its way to `plot`.
+pub fn run(configs: &Path, args: &Args, seed: u64, plot: Option<&Path>) -> anyhow::Result<Report> {
     let outcomes: Vec<Outcome> = (seed..seed + args.robots)
         .into_par_iter()
         .map(|seed| trial::play(configs, &args.profile, seed))
         .collect::<anyhow::Result<_>>()?;
+    if let (Some(path), Some(first)) = (plot, outcomes.first()) {
+        film::draw(path, &first.film).with_context(|| format!("cannot draw {}", path.display()))?;
+        tracing::info!("the first robot on its way: {}", path.display());
+    }
     let mut report = Report::new("bimanual", seed);
     let all = args.robots as f64;
     let count = |of: fn(&Outcome) -> bool| outcomes.iter().filter(|outcome| of(outcome)).count() as f64;

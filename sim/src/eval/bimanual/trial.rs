@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::film::Frame;
 use crate::eval::body::{Body, align};
 use crate::eval::lockstep::{Lockstep, ticks};
 use crate::robot::{Disturbance, EXCHANGE_S, Options};
@@ -31,6 +32,8 @@ const RECOVERY_S: f64 = 2.0;
 /// Up, back to above the shoulder, and the time for it.
 const UP: [f64; 3] = [-0.3, 0.0, 0.62];
 const UP_S: f64 = 4.0;
+/// Time between two pictures on the way up, s.
+const FILM_S: f64 = 1.1;
 
 /// How it went.
 #[derive(Debug, Clone, Default)]
@@ -57,6 +60,8 @@ pub struct Outcome {
     pub pushed_step: f64,
     /// See above.
     pub torque: f64,
+    /// On the way up, and where it reaches highest.
+    pub film: Vec<Frame>,
 }
 
 /// A robot that is watched.
@@ -138,6 +143,10 @@ impl Trial {
         Ok(true)
     }
 
+    fn film(&mut self, caption: String) {
+        self.outcome.film.push(Frame::take(&self.sut, &self.model, caption));
+    }
+
     /// How long it took, if it came there.
     fn go_to(&mut self, mode: Mode) -> anyhow::Result<Option<f64>> {
         self.sut.release();
@@ -145,6 +154,9 @@ impl Trial {
         for tick in 1..=ticks(PATIENCE_S) {
             if !self.tick()? {
                 return Ok(None);
+            }
+            if mode == Mode::Bimanual && (tick - 1).is_multiple_of(ticks(FILM_S)) {
+                self.film(format!("{:.1} s", (tick - 1) as f64 * EXCHANGE_S));
             }
             if self.sut.snapshot().mode == mode && self.sut.snapshot().goal == mode {
                 return Ok(Some(tick as f64 * EXCHANGE_S));
@@ -201,9 +213,12 @@ impl Trial {
             return Ok(());
         };
         self.sut.engage(&trajectory)?;
-        for _ in 0..ticks(trajectory.duration_s() + 0.5) {
+        for tick in 0..ticks(trajectory.duration_s() + 0.5) {
             if !self.tick()? {
                 break;
+            }
+            if tick == ticks(UP_S + 0.5) {
+                self.film("reaches up".into());
             }
             let height = self.sut.truth().world_from_gripper[Side::Right.index()].translation.z;
             self.outcome.height_m = self.outcome.height_m.max(height);
