@@ -127,7 +127,7 @@ fn torn_and_misread_tags_are_set_aside() {
 /// OpenCV's own pictures; its RMS of them as computed with its own `calibrateCamera`.
 #[test]
 fn real_chessboards_have_the_errors_that_opencv_finds() {
-    let folder = Path::new("/work/shared/real/opencv_samples");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/opencv_samples"));
     if !folder.is_dir() {
         return;
     }

@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub rigs: usize,
     /// The folder with other people's pictures and detections; what is not there is left out.
-    #[arg(long, value_name = "DIR", default_value = "/work/shared/real")]
+    #[arg(long, value_name = "DIR", default_value = "../shared/real")]
     pub real: PathBuf,
 }
 
