@@ -71,3 +71,15 @@ fn r_safe_037_upright_without_its_station_it_comes_down_by_itself() {
     sut.speaks = false;
     sut.run_until("stance", 20.0, |s| s.mode == Mode::Stance && s.goal == Mode::Stance);
 }
+
+#[test]
+fn it_sits_up_after_other_modes_too() {
+    for mode in [Mode::Locomotion, Mode::Foot(Side::Right), Mode::Gripper(Side::Left)] {
+        let mut sut = standing(1);
+        sut.request(mode);
+        sut.run(0.5);
+        sut.request(Mode::Bimanual);
+        sut.request(mode);
+        sut.request(Mode::Stance);
+    }
+}

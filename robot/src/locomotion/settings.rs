@@ -66,6 +66,12 @@ impl LocomotionSettings {
         checks.into_iter().find(|(_, sound, _)| !sound).map(|(key, _, expected)| (key, expected))
     }
 
+    /// The same, with feet that stand elsewhere about the middle of the robot: forward and aside, m.
+    #[must_use]
+    pub fn standing_at(&self, stance_m: Vector2<f64>) -> Self {
+        Self { placement: PlacementSettings { stance_m, ..self.placement }, ..*self }
+    }
+
     /// The same while arms hold something.
     #[must_use]
     pub fn for_holding(&self) -> Self {

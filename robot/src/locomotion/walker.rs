@@ -86,6 +86,11 @@ impl Walker {
         }
     }
 
+    /// Steps on the spot, until the feet are in their places, although nobody asks for motion.
+    pub const fn step_into_place(&mut self) {
+        self.resting_s = 0.0;
+    }
+
     /// A torso's reference, about the course.
     pub fn posture_of(&self, torso: &PoseReference) -> PoseReference {
         torso.rebased(&self.frame().inverse())

@@ -207,6 +207,13 @@ impl Choreography {
                 }
             }
             Phase::Halt => self.stow_arms(scene),
+            Phase::Gather => {
+                if scene.astray(&self.sitting.stance_m) > self.sitting.astray_m {
+                    self.driving.begin_gathering(self.sitting.stance_m, &self.setpoint, scene);
+                } else {
+                    self.driving.begin_stance(&self.setpoint, scene);
+                }
+            }
             // Half-way down it goes up again along the same path.
             Phase::Kneel if self.upright.is_some() => {}
             Phase::Kneel => {
@@ -293,6 +300,10 @@ impl Choreography {
                     self.setpoint.hold_arm(side, self.arms[side.index()].sample(elapsed_s));
                 }
                 Progress::on_four_feet(self.driving.is_halted() && self.arms_rest(elapsed_s))
+            }
+            Phase::Gather => {
+                self.driving.halt(scene, &mut self.setpoint);
+                Progress::on_four_feet(self.driving.is_halted())
             }
             Phase::Kneel | Phase::SitDown => self.sit(Node::Kneel, scene),
             Phase::SitUp => self.sit(Node::Upright, scene),

@@ -100,9 +100,21 @@ impl Driving {
 
     /// Takes over a robot that stands, to walk.
     pub fn begin_walk(&mut self, arms: Option<Arms>, setpoint: &Setpoint, scene: &Scene<'_>) {
+        let walking = Walking::begin(&self.locomotion, &self.limits, arms, setpoint, scene);
+        self.begin_walking(walking, setpoint);
+    }
+
+    /// Takes over a robot that stands, to step its feet to these places about its middle, forward and aside, m, and halt.
+    pub fn begin_gathering(&mut self, stance_m: Vector2<f64>, setpoint: &Setpoint, scene: &Scene<'_>) {
+        let settings = self.locomotion.standing_at(stance_m);
+        let mut walking = Walking::begin(&settings, &self.limits, None, setpoint, scene);
+        walking.step_into_place();
+        self.begin_walking(walking, setpoint);
+    }
+
+    fn begin_walking(&mut self, walking: Walking, setpoint: &Setpoint) {
         self.effector = None;
         self.bimanual = None;
-        let walking = Walking::begin(&self.locomotion, &self.limits, arms, setpoint, scene);
         let posture = walking.posture_of(&setpoint.torso);
         self.torso = DrivenBody::new(posture, self.limits.follower_rad_s, self.limits.stance_torso_rate);
         self.walking = Some(walking);
@@ -120,8 +132,11 @@ impl Driving {
         self.walking.as_ref().is_none_or(Walking::is_halted)
     }
 
-    /// One step of a robot that comes to a halt.
+    /// One step of a robot that comes to a halt; nothing for one that stands.
     pub fn halt(&mut self, scene: &Scene<'_>, setpoint: &mut Setpoint) {
+        if self.walking.is_none() {
+            return;
+        }
         self.release();
         self.walk(None, scene, setpoint);
     }

@@ -195,6 +195,8 @@ impl Machine {
                 Phase::Walk
             }
             Phase::Halt if inputs.arrived => Phase::Recentre,
+            Phase::Gather if self.goal != Mode::Bimanual => self.turn_back(Mode::Bimanual, Phase::Halt),
+            Phase::Gather if inputs.arrived => Phase::Kneel,
             Phase::Kneel if self.goal != Mode::Bimanual => self.turn_back(Mode::Bimanual, Phase::GetUp),
             Phase::Kneel if inputs.arrived => Phase::SitUp,
             Phase::SitUp if self.goal != Mode::Bimanual => self.turn_back(Mode::Bimanual, Phase::SitDown),
@@ -251,7 +253,7 @@ impl Machine {
                 Phase::Walk
             }
             Mode::LocoManipulation(arms) => Phase::Unfold(arms),
-            Mode::Bimanual => Phase::Kneel,
+            Mode::Bimanual => Phase::Gather,
             Mode::Damped | Mode::Stance | Mode::LieDown => Phase::Stance,
         }
     }

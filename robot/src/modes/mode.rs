@@ -162,6 +162,8 @@ pub enum Phase {
     WalkHolding(Arms),
     /// Slows down, steps until all feet are in their places, stands. Arms fold.
     Halt,
+    /// Feet step to under the hips, if they are not there.
+    Gather,
     /// The torso goes back and the knees to the ground, until shanks alone carry.
     Kneel,
     /// The torso rises, leg and arm of each side come before it.
@@ -178,7 +180,7 @@ pub enum Phase {
 
 impl Phase {
     /// All of them.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 35] = [
         Self::Damped,
         Self::StandUp,
         Self::Recentre,
@@ -207,6 +209,7 @@ impl Phase {
         Self::WalkHolding(Arms::One(Side::Left)),
         Self::WalkHolding(Arms::Both),
         Self::Halt,
+        Self::Gather,
         Self::Kneel,
         Self::SitUp,
         Self::Bimanual,
@@ -232,6 +235,7 @@ impl Phase {
             Self::Unfold(_) => "unfold arms",
             Self::WalkHolding(_) => "walk and hold",
             Self::Halt => "halt",
+            Self::Gather => "gather feet",
             Self::Kneel => "kneel",
             Self::SitUp => "sit up",
             Self::Bimanual => "bimanual",
@@ -284,6 +288,6 @@ impl Phase {
 
     /// The robot walks, or may at any time.
     pub const fn is_walking(self) -> bool {
-        matches!(self, Self::Walk | Self::WalkHolding(_) | Self::Halt)
+        matches!(self, Self::Walk | Self::WalkHolding(_) | Self::Gather | Self::Halt)
     }
 }

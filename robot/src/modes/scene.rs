@@ -62,6 +62,16 @@ impl Scene<'_> {
         Isometry3::from_parts((middle + Vector3::z() * height_m).into(), yaw)
     }
 
+    /// How far a foot is from its place about the middle of the feet at most: forward and aside, m.
+    pub fn astray(&self, stance_m: &Vector2<f64>) -> f64 {
+        let middle = self.middle_of_feet(0.0);
+        let of = |leg: Leg| {
+            let foot = middle.inverse_transform_point(&self.foot(leg).into());
+            (foot.coords.xy().abs() - stance_m).amax()
+        };
+        Leg::ALL.into_iter().map(of).fold(0.0, f64::max)
+    }
+
     /// The legs that stand, with the centres of their feet, and how many they are.
     pub fn footholds(&self, contacts: &ContactSet) -> ([(Leg, Vector3<f64>); 4], usize) {
         let (mut footholds, mut count) = ([(Leg::FrontRight, Vector3::zeros()); 4], 0);

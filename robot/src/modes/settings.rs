@@ -1,6 +1,6 @@
 //! Postures, durations and gains of the modes: part of `configs/robot/control.toml`.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
 
 use super::mode::Effector;
@@ -183,6 +183,10 @@ impl Default for MotionSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UprightSettings {
+    /// Where the feet stand about the middle of the robot before it kneels, forward and aside, m: under its hips.
+    pub stance_m: Vector2<f64>,
+    /// Feet farther from there than this step into place first, m.
+    pub astray_m: f64,
     /// When the knees come to the ground.
     pub touch_com_m: f64,
     /// When the front feet are unloaded.
@@ -202,6 +206,8 @@ pub struct UprightSettings {
 impl Default for UprightSettings {
     fn default() -> Self {
         Self {
+            stance_m: Vector2::new(0.188, 0.127),
+            astray_m: 0.02,
             touch_com_m: 0.04,
             kneel_com_m: -0.055,
             upright_com_m: -0.105,

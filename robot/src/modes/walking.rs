@@ -48,6 +48,11 @@ impl Walking {
         self.walker.posture_of(torso)
     }
 
+    /// Steps on the spot, until the feet are in their places.
+    pub const fn step_into_place(&mut self) {
+        self.walker.step_into_place();
+    }
+
     /// Whether it stands on four feet.
     pub const fn is_halted(&self) -> bool {
         self.walker.is_halted()

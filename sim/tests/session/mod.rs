@@ -148,6 +148,6 @@ impl Session {
         let operator = self.operator();
         operator.mode = Some(mode);
         operator.mode_request += 1;
-        self.run_until("mode", 15.0, |s| s.mode == mode && s.goal == mode);
+        self.run_until("mode", 25.0, |s| s.mode == mode && s.goal == mode);
     }
 }

@@ -169,7 +169,7 @@ fn sitting_up_and_coming_down_turn_round_anywhere() {
     ask(&mut sut, Mode::Bimanual);
     assert_eq!(
         run(&mut sut, &calm()),
-        [Phase::Kneel, Phase::SitUp, Phase::Bimanual],
+        [Phase::Gather, Phase::Kneel, Phase::SitUp, Phase::Bimanual],
         "the request itself leaves the stance"
     );
     ask(&mut sut, Mode::Stance);
@@ -259,7 +259,7 @@ fn from_every_state_every_mode_is_reached_without_a_step_from_foot_to_foot() {
                 let down = matches!(step[0], Phase::LowerFoot(_) | Phase::LiftFoot(_));
                 assert!(from.is_none() || to.is_some() || down, "{state:?}: {way:?}");
                 // A robot that walks stands still before anything else begins, but for its other arm's work.
-                if step[0].is_walking() && step[0] != Phase::Halt {
+                if step[0].is_walking() && step[0] != Phase::Halt && step[1] != Phase::Kneel {
                     assert_eq!(step[1], Phase::Halt, "{state:?}: {way:?}");
                 }
                 // The arm is folded before the foot goes down.
