@@ -46,6 +46,8 @@ pub enum Node {
 
 /// Share of the rise after which the front limbs leave the posture in which they stood: until then the torso lifts them.
 const LIMBS_AFTER: f64 = 0.5;
+/// Rear legs that kneel spread or close by so much at most: feet that stand farther off step into place before, rad.
+const MOST_HIP_RAD: f64 = 0.15;
 /// Each round leaves about a tenth of what lacks.
 const ROUNDS: usize = 6;
 
@@ -106,6 +108,7 @@ impl Path {
         let rear =
             (scene.foot(Leg::RearRight) + scene.foot(Leg::RearLeft)) / 2.0 - rolled_back(scene, &stand);
         let world_from_ground = Isometry3::from_parts(rear.into(), stand.rotation);
+        let goals = [settings.touch_com_m, settings.kneel_com_m, settings.upright_com_m];
         let mut path = Self {
             world_from_ground,
             geometry: Geometry::of(scene.model),
@@ -117,21 +120,33 @@ impl Path {
             ready: Side::ALL.map(|side| poses.upright(side)),
             stowed: Side::ALL.map(|side| poses.stow(side)),
         };
-        let goals = [settings.touch_com_m, settings.kneel_com_m, settings.upright_com_m];
-        let mut posture = poses.posture(&poses.stand_rad);
+        path.rear_hips = Side::ALL.map(|side| path.rear_hip(scene, side));
+        // Between where they will be: from farther away the front feet are out of reach.
+        let mut hips = path.geometry.knee[0] + 0.3 * path.geometry.thigh;
         for (place, (goal, node)) in goals.into_iter().zip([1.0, 2.0, 3.0]).enumerate() {
-            path.hips[place] = goal;
             for _ in 0..ROUNDS {
-                let com =
-                    path.world_from_ground.inverse_transform_point(&path.com(scene, node, &mut posture));
-                path.hips[place] = path.within_reach(path.hips[place] + goal - com.x);
+                path.hips[place] = path.within_reach(hips);
+                let com = centre_of_mass(scene.model, &path.torso(node), &path.posture(poses, scene, node));
+                hips =
+                    path.hips[place] + goal - path.world_from_ground.inverse_transform_point(&com.into()).x;
             }
+            path.hips[place] = path.within_reach(hips);
+            hips = path.hips[place];
             if node == 2.0 {
+                let posture = path.posture(poses, scene, node);
                 path.standing = Side::ALL.map(|side| of_leg(&posture, side.leg()));
-                path.rear_hips = Side::ALL.map(|side| of_leg(&posture, side.rear_leg()).x);
             }
         }
         path
+    }
+
+    /// The hip joint of a rear leg whose foot stands where it does, with the torso level over shanks that lie down.
+    fn rear_hip(&self, scene: &Scene<'_>, side: Side) -> f64 {
+        let leg = side.rear_leg();
+        let offset = |joint: usize| scene.model.joints[joint].parent_from_joint.translation.y;
+        let foot = self.world_from_ground.inverse_transform_point(&scene.foot(leg).into());
+        let aside = foot.y - offset(leg.first_joint()) - offset(leg.first_joint() + 1);
+        (aside / self.geometry.thigh).clamp(-MOST_HIP_RAD, MOST_HIP_RAD)
     }
 
     /// The hips are on a circle about the knees.
@@ -140,25 +155,19 @@ impl Path {
         hips.clamp(knee[0] - 0.7 * thigh, knee[0] + 0.9 * thigh)
     }
 
-    /// Centre of mass in the world at a place of the way, with the joints there.
-    fn com(&self, scene: &Scene<'_>, at: f64, posture: &mut JointVector) -> nalgebra::Point3<f64> {
-        let torso = self.torso(at);
-        let feet = if at > 2.0 { &[Leg::RearRight, Leg::RearLeft][..] } else { &Leg::ALL[..] };
-        for leg in feet {
-            let foot = torso.inverse_transform_point(&scene.foot(*leg).into()).coords;
-            let joints = leg_towards(scene.model, posture, *leg, &foot);
+    /// All joints at a place of the way; those of front legs that stand by where their feet are.
+    fn posture(&self, poses: &PoseSettings, scene: &Scene<'_>, at: f64) -> JointVector {
+        let mut posture = self.joints(at);
+        if at > 2.0 {
+            return posture;
+        }
+        let (torso, start) = (self.torso(at), poses.posture(&poses.stand_rad));
+        for leg in Side::ALL.map(Side::leg) {
+            let foot = torso.inverse_transform_point(&scene.foot(leg).into()).coords;
+            let joints = leg_towards(scene.model, &start, leg, &foot);
             posture.fixed_rows_mut::<3>(leg.first_joint()).copy_from(&joints);
         }
-        let planned = self.joints(at);
-        for side in Side::ALL {
-            if at > 2.0 {
-                let leg = of_leg(&planned, side.leg());
-                posture.fixed_rows_mut::<3>(side.leg().first_joint()).copy_from(&leg);
-            }
-            let arm = side.first_arm_joint();
-            posture.fixed_rows_mut::<3>(arm).copy_from(&planned.fixed_rows::<3>(arm));
-        }
-        centre_of_mass(scene.model, &torso, posture).into()
+        posture
     }
 
     /// The front feet stand as they do now: so they leave the ground, and so they come back to it.
